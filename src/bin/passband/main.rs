@@ -1,0 +1,2 @@
+//! The `passband` command.
+fn main() {}

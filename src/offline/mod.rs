@@ -1,0 +1,6 @@
+//! Headless rendering from files: scenes, meshes, images, the device, read-back, metrics and the f64 reference.
+//! The only part of the crate that creates instances, devices or queues, reads files or the environment, or prints.
+
+pub mod error;
+pub mod mesh;
+pub mod world;

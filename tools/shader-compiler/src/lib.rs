@@ -1,0 +1,1 @@
+//! Compiles `glsl/` into `spirv/`.
