@@ -1,0 +1,81 @@
+// The accessors through which every pass reads materials. A host with its own reflectance replaces this file.
+// Local frame: z is the normal, the viewer is in the half plane y = 0, x >= 0.
+#ifndef BRIDGE_MATERIALS_GLSL
+#define BRIDGE_MATERIALS_GLSL
+#include "half_vector.glsl"
+#include "ggx.glsl"
+
+const uint REFLECTANCE_TABLE = 0u;
+const uint REFLECTANCE_GGX = 1u;
+
+// Table resolution (MERL) and importance table layout (src/reflectance/importance.rs).
+const vec3 TABLE_SIZE = vec3(180.0, 90.0, 90.0); // phi_d, theta_d, theta_h
+const uint IMPORTANCE_ANGLES = 64u;
+const uint IMPORTANCE_ROWS = 64u;
+const uint IMPORTANCE_COLUMNS = 16u;
+const vec2 DENSITY_SIZE = vec2(16.0, 64.0); // cos(phi_h), warped theta_h
+
+struct MaterialRecord {
+    uvec4 kind;  // reflectance kind, table's place in the atlas (theta_d, theta_h), unused
+    vec4 f0;     // rgb; alpha
+    vec4 albedo; // rgb; scale of the table's values
+};
+
+layout(set = 1, binding = 0, std430) readonly buffer Materials {
+    MaterialRecord materials[];
+};
+layout(set = 1, binding = 1) uniform sampler3D reflectance_tables;        // reflectance in 1/sr, tables side by side in y and z
+layout(set = 1, binding = 2) uniform sampler2D importance_cells;    // cells t0, t1, phi0, phi1 of equal probability
+layout(set = 1, binding = 3) uniform sampler2D importance_density;      // density of h in 1/sr for weights
+
+// A material as seen from one view direction.
+struct Material {
+    MaterialRecord record;
+    ivec2 cell;      // first texel of its importance cells for this view angle
+    vec2 density;    // first texel of its density tile
+    vec2 table;      // first texel of its table in y, z
+};
+
+Material material_load(uint id, float cos_o) {
+    Material m;
+    m.record = materials[id];
+    uint angle = min(uint(acos_positive(clamp(cos_o, 0.0, 1.0)) * (2.0 * INV_PI * float(IMPORTANCE_ANGLES))), IMPORTANCE_ANGLES - 1u);
+    m.cell = ivec2(angle * IMPORTANCE_COLUMNS, id * IMPORTANCE_ROWS);
+    m.density = vec2(angle, id) * DENSITY_SIZE;
+    m.table = vec2(m.record.kind.yz) * TABLE_SIZE.yz;
+    return m;
+}
+
+// BRDF in 1/sr for directions above the horizon, h their half vector.
+vec3 material_evaluate(Material m, vec3 wi, vec3 wo, vec3 h) {
+    if (m.record.kind.x == REFLECTANCE_GGX) {
+        return ggx_evaluate(m.record.f0.rgb, m.record.albedo.rgb, m.record.f0.a, wi, wo, h);
+    }
+    vec2 c = vec2(acos_positive(clamp(dot(wo, h), 0.0, 1.0)) * (2.0 * INV_PI), half_warp(h)) * TABLE_SIZE.yz;
+    c = clamp(c, vec2(0.5), TABLE_SIZE.yz - 0.5) + m.table;
+    vec3 at = vec3(difference_turn(wi, h), c / vec2(textureSize(reflectance_tables, 0).yz));
+    return textureLod(reflectance_tables, at, 0.0).rgb * m.record.albedo.a;
+}
+
+// A half vector, and its density in 1/sr of h, from two 32-bit numbers (Bagher 2011, section 3.3).
+vec4 material_sample(Material m, uvec2 u) {
+    uint row, row_fraction, column, column_fraction;
+    umulExtended(u.x, IMPORTANCE_ROWS, row, row_fraction);
+    umulExtended(u.y << 1, IMPORTANCE_COLUMNS, column, column_fraction);
+    vec4 cell = texelFetch(importance_cells, m.cell + ivec2(column, row), 0);
+    vec2 size = cell.yw - cell.xz;
+    vec2 at = cell.xz + size * (vec2(row_fraction >> 8, column_fraction >> 8) * (1.0 / 16777216.0));
+    float s = sqrt(at.x * (2.0 - at.x));
+    float phi = (u.y & 0x80000000u) == 0u ? at.y : -at.y;
+    return vec4(s * cos(phi), s * sin(phi), 1.0 - at.x, 1.0 / (float(2u * IMPORTANCE_ROWS * IMPORTANCE_COLUMNS) * size.x * size.y));
+}
+
+// Smooth density of h in 1/sr, for multiple importance weights only: positive, deterministic, close to that of material_sample.
+float material_density(Material m, vec3 h) {
+    float s = length(h.xy);
+    float c = s > 0.0 ? 0.5 - 0.5 * h.x / s : 0.5;
+    vec2 at = clamp(vec2(c, half_warp(h)) * DENSITY_SIZE, vec2(0.5), DENSITY_SIZE - 0.5) + m.density;
+    return textureLod(importance_density, at / vec2(textureSize(importance_density, 0)), 0.0).x;
+}
+
+#endif

@@ -1,0 +1,24 @@
+#version 460
+// Writes the G-buffer in the encoding that glsl/bridge/gbuffer.glsl reads.
+
+layout(push_constant) uniform Push {
+    mat4 clip_from_object;
+    vec4 normal_from_object[3];
+    uvec4 id;
+} push;
+
+layout(location = 0) in vec3 world_normal;
+layout(location = 1) in vec2 uv;
+
+layout(location = 0) out vec4 surface;
+layout(location = 1) out uint ids;
+layout(location = 2) out vec2 coordinate;
+layout(location = 3) out vec4 derivative;
+
+void main() {
+    // The interpolated reciprocal of w is 1/depth along the view axis for every pinhole projection.
+    surface = vec4(normalize(world_normal), 1.0 / gl_FragCoord.w);
+    ids = push.id.x;
+    coordinate = uv;
+    derivative = vec4(dFdx(uv), dFdy(uv));
+}

@@ -1,0 +1,121 @@
+#version 460
+// Reflected radiance of listed samples by N directions each (Bagher 2011, equations 1 and 2, section 3.3): half from the
+// reflectance, half from the environment, combined by the balance heuristic; or all from the reflectance.
+#include "frame.glsl"
+#include "gbuffer.glsl"
+#include "materials.glsl"
+#include "environment.glsl"
+#include "sobol.glsl"
+#include "list.glsl"
+
+layout(local_size_x = LIST_GROUP) in;
+
+layout(constant_id = 0) const uint ESTIMATOR = 0u;
+const uint ESTIMATOR_MIS = 0u;
+const uint ESTIMATOR_BRDF = 1u;
+const uint ESTIMATOR_BRDF_RANDOM = 2u;
+
+layout(set = 2, binding = 3, std430) readonly buffer Arguments {
+    uint groups_x, groups_y, groups_z;
+    uint count;
+} arguments;
+layout(set = 2, binding = 4, std430) readonly buffer List {
+    uint list[];
+};
+layout(set = 2, binding = 5, rgba32f) uniform writeonly image2D radiance;
+
+layout(push_constant) uniform Push {
+    uint brdf_samples;
+    uint environment_samples;
+} push;
+
+// The shading frame: z the normal, bent towards the viewer where it faces away; the viewer in the half plane y = 0, x >= 0.
+struct Local {
+    vec3 x, y, z;
+    vec3 view;
+};
+
+const float FACING = 0.02;
+
+Local local_frame(vec3 n, vec3 v) {
+    float c = dot(n, v);
+    vec3 across = v - n * c; // the view direction's part in the tangent plane
+    if (dot(across, across) < 1e-12) {
+        across = abs(n.z) < 0.7 ? cross(n, vec3(0.0, 0.0, 1.0)) : cross(n, vec3(1.0, 0.0, 0.0));
+    }
+    Local f;
+    if (c < FACING) {
+        vec3 away = normalize(n - v * c);
+        n = v * FACING + away * sqrt(1.0 - FACING * FACING);
+        c = FACING;
+        across = v - n * c;
+    }
+    f.z = n;
+    f.x = normalize(across);
+    f.y = cross(n, f.x);
+    f.view = vec3(sqrt(max(1.0 - c * c, 0.0)), 0.0, c);
+    return f;
+}
+
+vec3 to_world(Local f, vec3 w) {
+    return f.x * w.x + f.y * w.y + f.z * w.z;
+}
+
+// Contribution of direction number i drawn from the reflectance.
+vec3 brdf_direction(Local f, Material m, uvec2 u) {
+    vec4 h = material_sample(m, u);
+    float cos_d = dot(f.view, h.xyz);
+    vec3 wi = h.xyz * (2.0 * cos_d) - f.view;
+    if (cos_d <= 0.0 || wi.z <= 0.0) {
+        return vec3(0.0);
+    }
+    vec3 w = to_world(f, wi);
+    vec4 light = environment_lookup(w);
+    vec3 value = material_evaluate(m, wi, f.view, h.xyz) * light.rgb * wi.z;
+    float jacobian = 0.25 / cos_d;
+    if (ESTIMATOR != ESTIMATOR_MIS) {
+        return value / (h.w * jacobian * float(push.brdf_samples));
+    }
+    float smooth_density = material_density(m, h.xyz);
+    float brdf = float(push.brdf_samples) * smooth_density * jacobian;
+    float environment = float(push.environment_samples) * environment_per_steradian(light.a, length(w.xz));
+    return value * (smooth_density / (h.w * (brdf + environment)));
+}
+
+// Contribution of a direction drawn from the environment.
+vec3 environment_direction(Local f, Material m, uvec2 u) {
+    EnvironmentSample s = environment_sample(u);
+    vec3 wi = vec3(dot(s.direction, f.x), dot(s.direction, f.y), dot(s.direction, f.z));
+    if (wi.z <= 0.0) {
+        return vec3(0.0);
+    }
+    vec3 h = normalize(wi + f.view);
+    float brdf = float(push.brdf_samples) * material_density(m, h) * 0.25 / dot(f.view, h);
+    vec3 value = material_evaluate(m, wi, f.view, h) * s.radiance * wi.z;
+    return value / (brdf + float(push.environment_samples) * s.density);
+}
+
+void main() {
+    uint index = list_index();
+    if (index >= arguments.count) {
+        return;
+    }
+    uint entry = list[index];
+    ivec2 p = ivec2(entry & 0xffffu, entry >> 16);
+    Local f = local_frame(gbuffer_normal(p), -normalize(frame_ray(p)));
+    Material m = material_load(gbuffer_material(p), f.view.z);
+
+    uint seed = hash(entry ^ hash(frame.sampling.x ^ hash(frame.sampling.y)));
+    vec3 sum = vec3(0.0);
+    uvec2 seeds = sobol_seeds(seed);
+    for (uint i = 0u; i < push.brdf_samples; ++i) {
+        sum += brdf_direction(f, m, ESTIMATOR == ESTIMATOR_BRDF_RANDOM ? random_point(i, seed) : sobol_point(i, seeds));
+    }
+    if (ESTIMATOR == ESTIMATOR_MIS) {
+        seeds = sobol_seeds(seed + 1u);
+        for (uint i = 0u; i < push.environment_samples; ++i) {
+            sum += environment_direction(f, m, sobol_point(i, seeds));
+        }
+    }
+    imageStore(radiance, p, vec4(sum, 1.0));
+}

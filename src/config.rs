@@ -1,0 +1,80 @@
+//! What a renderer is built for. Everything here is fixed until [`crate::Renderer::resize`] or a new renderer.
+
+use crate::error::{Error, Result};
+use crate::gpu::pipeline::Modules;
+use ash::vk;
+
+/// How directions are drawn and combined at a shaded sample.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Estimator {
+    /// Multiple importance sampling of reflectance and environment with Owen-scrambled Sobol points, half each.
+    #[default]
+    Mis,
+    /// Reflectance importance sampling with the same points.
+    Brdf,
+    /// Reflectance importance sampling with independent random points (Bagher 2011, section 3.3).
+    BrdfRandom,
+}
+
+/// Where the G-buffer comes from.
+#[derive(Clone, Copy, Debug, Default)]
+pub enum GBufferSource {
+    /// The renderer rasterises draws into its own.
+    #[default]
+    Draws,
+    /// The host's own, read through its replacement of `glsl/bridge/gbuffer.glsl` (see [`Config::modules`]).
+    Host {
+        /// Layout of the host's descriptor set 0.
+        layout: vk::DescriptorSetLayout,
+    },
+}
+
+/// Settings of a [`crate::Renderer`].
+#[derive(Clone)]
+pub struct Config {
+    /// Output width and height in pixels, 1 to 16384 each.
+    pub extent: [u32; 2],
+    /// Shading samples a side of an output pixel: 1, 2 or 4 (1, 4 or 16 samples a pixel).
+    pub samples_per_side: u32,
+    /// Frames that may be in flight, 1 to 8: as many slots as `record` is called with.
+    pub frames_in_flight: usize,
+    /// Estimator.
+    pub estimator: Estimator,
+    /// Directions a shaded sample, 1 to 65536; at least 2 for [`Estimator::Mis`].
+    pub directions: u32,
+    /// Whether the curvature pass runs (an output of its own until something in the frame reads it).
+    pub curvature: bool,
+    /// Where the G-buffer comes from.
+    pub gbuffer: GBufferSource,
+    /// Replacements of compiled modules.
+    pub modules: Modules,
+}
+
+impl Config {
+    /// Defaults for an output of `extent` pixels: one sample a pixel, 64 directions, two frames in flight.
+    pub fn new(extent: [u32; 2]) -> Self {
+        Self {
+            extent,
+            samples_per_side: 1,
+            frames_in_flight: 2,
+            estimator: Estimator::default(),
+            directions: 64,
+            curvature: false,
+            gbuffer: GBufferSource::default(),
+            modules: Modules::default(),
+        }
+    }
+
+    pub(crate) fn validate(&self) -> Result<()> {
+        let check = |ok: bool, field: &str, expected: &str, got: String| {
+            if ok { Ok(()) } else { Err(Error::invalid(format!("Config::{field}"), expected, got)) }
+        };
+        let side = self.samples_per_side;
+        check(matches!(side, 1 | 2 | 4), "samples_per_side", "1, 2 or 4", side.to_string())?;
+        let fits = |e: u32| (1..=16384).contains(&e) && e * side <= 65535;
+        check(self.extent.into_iter().all(fits), "extent", "1 to 16384 pixels a side", format!("{}x{}", self.extent[0], self.extent[1]))?;
+        check((1..=8).contains(&self.frames_in_flight), "frames_in_flight", "1 to 8", self.frames_in_flight.to_string())?;
+        let least = if self.estimator == Estimator::Mis { 2 } else { 1 };
+        check((least..=65536).contains(&self.directions), "directions", &format!("{least} to 65536"), self.directions.to_string())
+    }
+}

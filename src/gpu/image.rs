@@ -1,0 +1,99 @@
+//! Images that the renderer owns.
+
+use crate::error::{Error, Result};
+use crate::gpu::context::VkResultExt;
+use crate::gpu::memory::{Block, Location, MemoryRequest, allocate};
+use crate::gpu::retire::{Build, Handle, Retired};
+use ash::vk;
+
+/// What an image is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct ImageDesc {
+    pub name: &'static str,
+    pub format: vk::Format,
+    /// Width, height, depth; a depth above 1 makes it 3-D.
+    pub extent: [u32; 3],
+    pub usage: vk::ImageUsageFlags,
+}
+
+impl ImageDesc {
+    pub fn aspect(&self) -> vk::ImageAspectFlags {
+        match self.format {
+            vk::Format::D32_SFLOAT => vk::ImageAspectFlags::DEPTH,
+            _ => vk::ImageAspectFlags::COLOR,
+        }
+    }
+
+    /// Bytes of the texels, without the driver's padding.
+    pub fn bytes(&self) -> u64 {
+        self.extent.iter().map(|&e| u64::from(e)).product::<u64>() * texel_bytes(self.format)
+    }
+}
+
+/// Bytes of one texel of the formats that the frame uses.
+pub(crate) fn texel_bytes(format: vk::Format) -> u64 {
+    match format {
+        vk::Format::R16_SFLOAT => 2,
+        vk::Format::R32G32_SFLOAT | vk::Format::R32G32_UINT | vk::Format::R16G16B16A16_SFLOAT => 8,
+        vk::Format::R32G32B32A32_SFLOAT => 16,
+        _ => 4,
+    }
+}
+
+/// An image with one view of all of it.
+#[derive(Debug)]
+pub struct Image {
+    pub(crate) desc: ImageDesc,
+    pub(crate) handle: vk::Image,
+    pub(crate) view: vk::ImageView,
+    block: Block,
+}
+
+impl Image {
+    pub(crate) fn new(build: &mut Build<'_>, desc: ImageDesc) -> Result<Self> {
+        let device = &build.cx.device;
+        let [width, height, depth] = desc.extent;
+        let limits = &build.cx.limits;
+        let (kind, view_kind, limit) = if depth > 1 {
+            (vk::ImageType::TYPE_3D, vk::ImageViewType::TYPE_3D, limits.max_image_dimension3_d)
+        } else {
+            (vk::ImageType::TYPE_2D, vk::ImageViewType::TYPE_2D, limits.max_image_dimension2_d)
+        };
+        if desc.extent.iter().any(|&e| e == 0 || e > limit) {
+            return Err(Error::invalid(format!("extent of image {}", desc.name), format!("1 to {limit}"), format!("{:?}", desc.extent)));
+        }
+        let info = vk::ImageCreateInfo::default()
+            .image_type(kind)
+            .format(desc.format)
+            .extent(vk::Extent3D { width, height, depth })
+            .mip_levels(1)
+            .array_layers(1)
+            .samples(vk::SampleCountFlags::TYPE_1)
+            .usage(desc.usage);
+        // SAFETY: the device is alive; the description is checked above and by Requirements.
+        let handle = build.track(unsafe { device.create_image(&info, None) }.named("vkCreateImage")?, Handle::Image);
+        build.cx.name(handle, desc.name);
+        // SAFETY: the image is alive and unbound.
+        let requirements = unsafe { device.get_image_memory_requirements(handle) };
+        let request = MemoryRequest { name: desc.name, requirements, location: Location::Device, linear: false };
+        let block = allocate(build.memory, &request)?;
+        build.track_block(&block);
+        // SAFETY: the block satisfies the image's requirements and is unshared.
+        unsafe { device.bind_image_memory(handle, block.memory, block.offset) }.named("vkBindImageMemory")?;
+        let range = vk::ImageSubresourceRange { aspect_mask: desc.aspect(), level_count: 1, layer_count: 1, ..Default::default() };
+        let info = vk::ImageViewCreateInfo::default().image(handle).view_type(view_kind).format(desc.format).subresource_range(range);
+        // SAFETY: the image is bound.
+        let view = build.track(unsafe { device.create_image_view(&info, None) }.named("vkCreateImageView")?, Handle::View);
+        Ok(Self { desc, handle, view, block })
+    }
+
+    pub(crate) fn extent(&self) -> [u32; 2] {
+        [self.desc.extent[0], self.desc.extent[1]]
+    }
+
+    pub(crate) fn retire(self, bag: &mut Retired) {
+        bag.push(Handle::View(self.view));
+        bag.push(Handle::Image(self.handle));
+        bag.push(Handle::Memory(self.block));
+    }
+}

@@ -1,0 +1,36 @@
+//! The frame's samplers: no anisotropy, which is an optional feature and unreliable in compute on the reference driver.
+
+use crate::error::Result;
+use crate::gpu::context::VkResultExt;
+use crate::gpu::retire::{Build, Handle, Retired};
+use ash::vk;
+
+/// Nearest for fetches, linear with wrapping in the first coordinate for look-ups.
+pub(crate) struct Samplers {
+    pub nearest: vk::Sampler,
+    pub linear: vk::Sampler,
+}
+
+impl Samplers {
+    pub fn new(build: &mut Build<'_>) -> Result<Self> {
+        let mut make = |filter, name: &str| {
+            let info = vk::SamplerCreateInfo::default()
+                .mag_filter(filter)
+                .min_filter(filter)
+                .address_mode_u(vk::SamplerAddressMode::REPEAT)
+                .address_mode_v(vk::SamplerAddressMode::CLAMP_TO_EDGE)
+                .address_mode_w(vk::SamplerAddressMode::CLAMP_TO_EDGE)
+                .max_lod(vk::LOD_CLAMP_NONE);
+            // SAFETY: the device is alive.
+            let sampler = unsafe { build.cx.device.create_sampler(&info, None) }.named("vkCreateSampler")?;
+            build.cx.name(sampler, name);
+            Ok(build.track(sampler, Handle::Sampler))
+        };
+        Ok(Self { nearest: make(vk::Filter::NEAREST, "nearest")?, linear: make(vk::Filter::LINEAR, "linear")? })
+    }
+
+    pub fn retire(self, bag: &mut Retired) {
+        bag.push(Handle::Sampler(self.nearest));
+        bag.push(Handle::Sampler(self.linear));
+    }
+}

@@ -1,0 +1,206 @@
+//! Pass 1: rasterises draws into normal, depth, ids, texture coordinate and its derivative (Bagher 2011, section 3).
+
+use crate::error::{Error, Result};
+use crate::gpu::access::Access;
+use crate::gpu::image::{Image, ImageDesc};
+use crate::gpu::pipeline::{RasterPipeline, Resource, Sets, set_layout, write_set};
+use crate::gpu::recorder::Recorder;
+use crate::gpu::retire::{Build, Handle, Retired};
+use crate::gpu::sampler::Samplers;
+use crate::pass::PassContext;
+use ash::vk;
+use bytemuck::{Pod, Zeroable};
+use glam::{Mat3, Mat4};
+
+/// Pass, shader, label, timer and AOV name.
+pub const NAME: &str = "gbuffer";
+
+/// Descriptor types of set 0 as `glsl/bridge/gbuffer.glsl` declares them.
+pub const BRIDGE: [vk::DescriptorType; 4] = [vk::DescriptorType::COMBINED_IMAGE_SAMPLER; 4];
+
+const COLORS: [vk::Format; 4] =
+    [vk::Format::R32G32B32A32_SFLOAT, vk::Format::R32_UINT, vk::Format::R32G32_SFLOAT, vk::Format::R32G32B32A32_SFLOAT];
+const DEPTH: vk::Format = vk::Format::D32_SFLOAT;
+
+#[repr(C)]
+#[derive(Clone, Copy, Pod, Zeroable)]
+struct Push {
+    clip_from_object: [[f32; 4]; 4],
+    normal_from_object: [[f32; 4]; 3],
+    id: [u32; 4],
+}
+const _: () = assert!(size_of::<Push>() <= 128);
+
+/// One indexed triangle mesh to rasterise. Streams are tightly packed and ready for vertex input when `record`ed work runs.
+#[derive(Clone, Copy, Debug)]
+pub struct Draw {
+    /// `R32G32B32_SFLOAT` positions and byte offset.
+    pub positions: (vk::Buffer, u64),
+    /// `R32G32B32_SFLOAT` normals and byte offset.
+    pub normals: (vk::Buffer, u64),
+    /// `R32G32_SFLOAT` texture coordinates and byte offset.
+    pub coordinates: (vk::Buffer, u64),
+    /// 32-bit indices and byte offset.
+    pub indices: (vk::Buffer, u64),
+    /// Indices to draw.
+    pub index_count: u32,
+    /// World from object, column-major, invertible.
+    pub world_from_object: [f32; 16],
+    /// Index of the material among those uploaded, below 65535.
+    pub material: u32,
+    /// The host's number for the object, below 65535; edges between objects are kept.
+    pub object: u32,
+}
+
+/// The G-buffer in the encoding of `glsl/bridge/gbuffer.glsl`.
+pub(crate) struct GBufferImages {
+    /// World normal; depth along the view axis in metres.
+    surface: Image,
+    /// 0 for nothing, else (object << 16 | material) + 1.
+    ids: Image,
+    /// Texture coordinate.
+    coordinate: Image,
+    /// d(uv)/dx, d(uv)/dy in texture units a sample.
+    derivative: Image,
+    depth: Image,
+}
+
+impl GBufferImages {
+    pub fn new(build: &mut Build<'_>, [surface, ids, coordinate, derivative, depth]: [ImageDesc; 5]) -> Result<Self> {
+        Ok(Self {
+            surface: Image::new(build, surface)?,
+            ids: Image::new(build, ids)?,
+            coordinate: Image::new(build, coordinate)?,
+            derivative: Image::new(build, derivative)?,
+            depth: Image::new(build, depth)?,
+        })
+    }
+
+    pub fn colors(&self) -> [&Image; 4] {
+        [&self.surface, &self.ids, &self.coordinate, &self.derivative]
+    }
+
+    pub fn into_images(self) -> [Image; 5] {
+        [self.surface, self.ids, self.coordinate, self.derivative, self.depth]
+    }
+}
+
+pub(crate) struct Io<'a> {
+    pub draws: &'a [Draw],
+    pub clip_from_world: Mat4,
+    /// Out.
+    pub images: &'a GBufferImages,
+}
+
+/// The pipeline, and set 0 for the passes that read the result.
+pub(crate) struct GBuffer {
+    pipeline: RasterPipeline,
+    pub layout: vk::DescriptorSetLayout,
+    sets: Sets,
+}
+
+impl GBuffer {
+    pub fn new(p: &mut PassContext<'_, '_>) -> Result<Self> {
+        let streams = [(vk::Format::R32G32B32_SFLOAT, 12), (vk::Format::R32G32B32_SFLOAT, 12), (vk::Format::R32G32_SFLOAT, 8)];
+        let pipeline = RasterPipeline::new(p.build, p.modules, NAME, size_of::<Push>() as u32, &streams, &COLORS, DEPTH)?;
+        let layout = set_layout(p.build, vk::ShaderStageFlags::COMPUTE, &BRIDGE)?;
+        let sets = Sets::new(p.build, layout, &BRIDGE, p.slots)?;
+        Ok(Self { pipeline, layout, sets })
+    }
+
+    pub fn record(&self, rec: &mut Recorder<'_>, io: &Io<'_>) {
+        rec.begin(NAME);
+        let colors = io.images.colors();
+        colors.into_iter().for_each(|image| rec.overwrite(image, Access::COLOR_WRITE));
+        rec.overwrite(&io.images.depth, Access::DEPTH_WRITE);
+        rec.flush();
+        let attachment = |image: &Image, layout, depth: f32| {
+            let clear = if image.desc.format == DEPTH {
+                vk::ClearValue { depth_stencil: vk::ClearDepthStencilValue { depth, stencil: 0 } }
+            } else {
+                vk::ClearValue { color: vk::ClearColorValue { uint32: [0; 4] } }
+            };
+            vk::RenderingAttachmentInfo::default()
+                .image_view(image.view)
+                .image_layout(layout)
+                .load_op(vk::AttachmentLoadOp::CLEAR)
+                .store_op(if image.desc.format == DEPTH { vk::AttachmentStoreOp::DONT_CARE } else { vk::AttachmentStoreOp::STORE })
+                .clear_value(clear)
+        };
+        let attachments = colors.map(|image| attachment(image, Access::COLOR_WRITE.layout, 0.0));
+        let depth = attachment(&io.images.depth, Access::DEPTH_WRITE.layout, 1.0);
+        let [width, height] = io.images.surface.extent();
+        let area = vk::Rect2D { extent: vk::Extent2D { width, height }, ..Default::default() };
+        let info = vk::RenderingInfo::default()
+            .render_area(area)
+            .layer_count(1)
+            .color_attachments(&attachments)
+            .depth_attachment(&depth);
+        let viewport = vk::Viewport { width: width as f32, height: height as f32, max_depth: 1.0, ..Default::default() };
+        let device = &rec.cx.device;
+        // SAFETY: the command buffer is recording; attachments were made ready above; dynamic state is all set.
+        unsafe {
+            device.cmd_begin_rendering(rec.cmd, &info);
+            device.cmd_bind_pipeline(rec.cmd, vk::PipelineBindPoint::GRAPHICS, self.pipeline.pipeline);
+            device.cmd_set_viewport(rec.cmd, 0, &[viewport]);
+            device.cmd_set_scissor(rec.cmd, 0, &[area]);
+        }
+        for draw in io.draws {
+            self.draw(rec, io, draw);
+        }
+        // SAFETY: closes the rendering begun above.
+        unsafe { device.cmd_end_rendering(rec.cmd) };
+        rec.end();
+    }
+
+    fn draw(&self, rec: &Recorder<'_>, io: &Io<'_>, draw: &Draw) {
+        let world = Mat4::from_cols_array(&draw.world_from_object);
+        let normal = Mat3::from_mat4(world).inverse().transpose();
+        let push = Push {
+            clip_from_object: (io.clip_from_world * world).to_cols_array_2d(),
+            normal_from_object: normal.to_cols_array_2d().map(|[x, y, z]| [x, y, z, 0.0]),
+            id: [(draw.object << 16 | draw.material) + 1, 0, 0, 0],
+        };
+        let stages = vk::ShaderStageFlags::VERTEX | vk::ShaderStageFlags::FRAGMENT;
+        let streams = [draw.positions, draw.normals, draw.coordinates];
+        let device = &rec.cx.device;
+        // SAFETY: inside the rendering; the host promises that its buffers hold what `Draw` says.
+        unsafe {
+            device.cmd_push_constants(rec.cmd, self.pipeline.layout, stages, 0, bytemuck::bytes_of(&push));
+            device.cmd_bind_vertex_buffers(rec.cmd, 0, &streams.map(|s| s.0), &streams.map(|s| s.1));
+            device.cmd_bind_index_buffer(rec.cmd, draw.indices.0, draw.indices.1, vk::IndexType::UINT32);
+            device.cmd_draw_indexed(rec.cmd, draw.index_count, 1, 0, 0, 0);
+        }
+    }
+
+    /// Set 0 of this slot over the images that `record` wrote, made ready to be sampled.
+    pub fn bridge(&self, rec: &mut Recorder<'_>, images: &GBufferImages, samplers: &Samplers) -> vk::DescriptorSet {
+        let images = images.colors();
+        images.into_iter().for_each(|image| rec.image(image, Access::COMPUTE_SAMPLED));
+        let set = self.sets.sets[rec.slot];
+        write_set(&rec.cx.device, set, &images.map(|image| Resource::Sampled(image, samplers.nearest)));
+        set
+    }
+
+    pub fn retire(self, bag: &mut Retired) {
+        self.pipeline.retire(bag);
+        self.sets.retire(bag);
+        bag.push(Handle::SetLayout(self.layout));
+    }
+}
+
+/// Refuses draws that cannot be encoded or transformed.
+pub(crate) fn check(draws: &[Draw]) -> Result<()> {
+    for (i, draw) in draws.iter().enumerate() {
+        for (field, value) in [("material", draw.material), ("object", draw.object)] {
+            if value >= 0xffff {
+                return Err(Error::invalid(format!("draws[{i}].{field}"), "below 65535", value));
+            }
+        }
+        let determinant = Mat4::from_cols_array(&draw.world_from_object).determinant();
+        if !determinant.is_normal() {
+            return Err(Error::invalid(format!("draws[{i}].world_from_object"), "an invertible matrix", format!("determinant {determinant}")));
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,246 @@
+//! Pass 0b: reflectance tables and importance tables, uploaded on change (Bagher 2011, section 3.3).
+
+use crate::error::{Error, Result};
+use crate::gpu::access::Access;
+use crate::gpu::buffer::Buffer;
+use crate::gpu::image::{Image, ImageDesc};
+use crate::gpu::pipeline::{Resource, Sets, set_layout, write_set};
+use crate::gpu::recorder::{Recorder, States};
+use crate::gpu::retire::{Build, Handle, Retired};
+use crate::gpu::sampler::Samplers;
+use crate::gpu::upload::{BufferUpload, ImageUpload};
+use crate::reflectance::importance::{COLUMNS, DENSITY_COLUMNS, DENSITY_ROWS, ImportanceTable, ROWS, VIEW_ANGLES};
+use crate::reflectance::merl::{PHI_DIFF, THETA_DIFF, THETA_HALF};
+use crate::reflectance::{MerlTable, Model};
+use ash::vk;
+use bytemuck::{Pod, Zeroable};
+use half::f16;
+use std::sync::Arc;
+
+/// Pass, label and set-up time name.
+pub const NAME: &str = "materials";
+
+/// Descriptor types of set 1 as `glsl/bridge/materials.glsl` declares them.
+pub const BRIDGE: [vk::DescriptorType; 4] = [
+    vk::DescriptorType::STORAGE_BUFFER,
+    vk::DescriptorType::COMBINED_IMAGE_SAMPLER,
+    vk::DescriptorType::COMBINED_IMAGE_SAMPLER,
+    vk::DescriptorType::COMBINED_IMAGE_SAMPLER,
+];
+
+/// Materials that fit the importance atlas on every device (4096 rows).
+pub const MAX_MATERIALS: usize = 64;
+
+/// Mirrors `MaterialRecord` in `glsl/bridge/materials.glsl`.
+#[repr(C)]
+#[derive(Clone, Copy, Pod, Zeroable)]
+struct Record {
+    kind: [u32; 4],
+    f0: [f32; 4],
+    albedo: [f32; 4],
+}
+
+/// What the shaders read.
+pub(crate) struct MaterialImages {
+    records: Buffer,
+    tables: Image,
+    importance: Image,
+    density: Image,
+}
+
+/// Created and filled, not yet recorded.
+pub(crate) struct MaterialsUpload {
+    records: BufferUpload,
+    tables: ImageUpload,
+    importance: ImageUpload,
+    density: ImageUpload,
+}
+
+/// Where table number `i` of `count` stands in the atlas, and the atlas's size, in tables along theta_d and theta_h.
+fn place(i: usize, count: usize, limit: u32) -> Option<([u32; 2], [u32; 2])> {
+    let per_side = limit as usize / THETA_DIFF;
+    let rows = count.div_ceil(per_side.max(1)).max(1);
+    (rows <= per_side).then(|| {
+        let columns = count.min(per_side).max(1);
+        ([(i % columns) as u32, (i / columns) as u32], [columns as u32, rows as u32])
+    })
+}
+
+impl MaterialsUpload {
+    pub fn new(build: &mut Build<'_>, models: &[Model]) -> Result<Self> {
+        if models.is_empty() || models.len() > MAX_MATERIALS {
+            return Err(Error::invalid("materials", format!("1 to {MAX_MATERIALS}"), models.len()));
+        }
+        // A table that several materials share is stored once.
+        let mut tables: Vec<&Arc<MerlTable>> = Vec::new();
+        let mut slots = Vec::new();
+        for model in models {
+            slots.push(if let Model::Table(table) = model {
+                let known = tables.iter().position(|t| Arc::ptr_eq(t, table));
+                known.unwrap_or_else(|| {
+                    tables.push(table);
+                    tables.len() - 1
+                })
+            } else {
+                0
+            });
+        }
+        let limit = build.cx.limits.max_image_dimension3_d;
+        let atlas = place(0, tables.len(), limit)
+            .ok_or_else(|| Error::invalid("materials", format!("tables that fit a 3-D image of side {limit}"), tables.len()))?
+            .1;
+        let packed: Vec<_> = tables.iter().map(|t| t.packed()).collect();
+        let records: Vec<_> = models
+            .iter()
+            .zip(&slots)
+            .map(|(model, &slot)| match model {
+                Model::Table(_) => {
+                    let at = place(slot, tables.len(), limit).map_or([0, 0], |p| p.0);
+                    Record { kind: [0, at[0], at[1], 0], f0: [0.0; 4], albedo: [0.0, 0.0, 0.0, packed[slot].0] }
+                }
+                Model::Ggx(g) => {
+                    let with = |v: glam::DVec3, w: f64| v.extend(w).as_vec4().to_array();
+                    Record { kind: [1, 0, 0, 0], f0: with(g.f0, g.alpha), albedo: with(g.albedo, 1.0) }
+                }
+            })
+            .collect();
+        let importance: Vec<_> = models.iter().map(|m| ImportanceTable::build(m)).collect();
+        let image = |name, format, extent| ImageDesc { name, format, extent, usage: vk::ImageUsageFlags::SAMPLED };
+        let angles = VIEW_ANGLES as u32;
+        let count = models.len() as u32;
+        let table_extent = [PHI_DIFF as u32, THETA_DIFF as u32 * atlas[0], THETA_HALF as u32 * atlas[1]];
+        let cell_extent = [angles * COLUMNS as u32, ROWS as u32 * count, 1];
+        let density_extent = [angles * DENSITY_COLUMNS as u32, DENSITY_ROWS as u32 * count, 1];
+        let texels = table_atlas(&packed, atlas);
+        let cells = side_by_side(importance.iter().map(ImportanceTable::cells), ROWS, COLUMNS);
+        let density: Vec<f16> =
+            side_by_side(importance.iter().map(ImportanceTable::density_texels), DENSITY_ROWS, DENSITY_COLUMNS)
+                .into_iter()
+                .map(f16::from_f32)
+                .collect();
+        let cast = bytemuck::cast_slice::<u32, u8>;
+        Ok(Self {
+            records: BufferUpload::new(build, "materials", vk::BufferUsageFlags::STORAGE_BUFFER, bytemuck::cast_slice(&records))?,
+            tables: ImageUpload::new(build, image("tables", vk::Format::E5B9G9R9_UFLOAT_PACK32, table_extent), cast(&texels))?,
+            importance: ImageUpload::new(
+                build,
+                image("importance", vk::Format::R32G32B32A32_SFLOAT, cell_extent),
+                bytemuck::cast_slice(&cells),
+            )?,
+            density: ImageUpload::new(
+                build,
+                image("importance density", vk::Format::R16_SFLOAT, density_extent),
+                bytemuck::cast_slice(&density),
+            )?,
+        })
+    }
+
+    pub fn record(self, rec: &mut Recorder<'_>, bag: &mut Retired) -> MaterialImages {
+        MaterialImages {
+            records: self.records.record(rec, bag),
+            tables: self.tables.record(rec, bag),
+            importance: self.importance.record(rec, bag),
+            density: self.density.record(rec, bag),
+        }
+    }
+}
+
+/// Tables (phi_d fastest, then theta_d, then theta_h) laid side by side in theta_d and theta_h.
+fn table_atlas(packed: &[(f32, Vec<u32>)], [columns, rows]: [u32; 2]) -> Vec<u32> {
+    let (columns, rows) = (columns as usize, rows as usize);
+    let slice = THETA_DIFF * PHI_DIFF;
+    let mut atlas = vec![0; columns * rows * slice * THETA_HALF];
+    for (i, (_, table)) in packed.iter().enumerate() {
+        let (column, row) = (i % columns, i / columns);
+        for (theta_h, texels) in table.chunks_exact(slice).enumerate() {
+            let at = ((row * THETA_HALF + theta_h) * columns + column) * slice;
+            atlas[at..at + slice].copy_from_slice(texels);
+        }
+    }
+    atlas
+}
+
+/// Tiles of `rows x columns`, one a view angle, side by side; one row of tiles a material.
+fn side_by_side<'a, T: Copy + 'a>(materials: impl Iterator<Item = &'a [T]>, rows: usize, columns: usize) -> Vec<T> {
+    let mut out = Vec::new();
+    for tiles in materials {
+        for row in 0..rows {
+            for tile in tiles.chunks_exact(rows * columns) {
+                out.extend_from_slice(&tile[row * columns..(row + 1) * columns]);
+            }
+        }
+    }
+    out
+}
+
+impl MaterialImages {
+    /// Declares everything read by the pass that is open.
+    pub fn sampled(&self, rec: &mut Recorder<'_>) {
+        rec.buffer(&self.records, Access::COMPUTE_READ);
+        [&self.tables, &self.importance, &self.density].into_iter().for_each(|i| rec.image(i, Access::COMPUTE_SAMPLED));
+    }
+
+    pub fn retire(self, states: &mut States, bag: &mut Retired) {
+        states.forget(self.records.handle);
+        self.records.retire(bag);
+        for image in [self.tables, self.importance, self.density] {
+            states.forget(image.handle);
+            image.retire(bag);
+        }
+    }
+}
+
+/// Set 1 for the passes that read materials.
+pub(crate) struct MaterialBridge {
+    pub layout: vk::DescriptorSetLayout,
+    sets: Sets,
+}
+
+impl MaterialBridge {
+    pub fn new(build: &mut Build<'_>, slots: usize) -> Result<Self> {
+        let layout = set_layout(build, vk::ShaderStageFlags::COMPUTE, &BRIDGE)?;
+        Ok(Self { layout, sets: Sets::new(build, layout, &BRIDGE, slots)? })
+    }
+
+    /// Set 1 of this slot over `images`.
+    pub fn write(&self, rec: &Recorder<'_>, images: &MaterialImages, samplers: &Samplers) -> vk::DescriptorSet {
+        let set = self.sets.sets[rec.slot];
+        let resources = [
+            Resource::Buffer(&images.records),
+            Resource::Sampled(&images.tables, samplers.linear),
+            Resource::Sampled(&images.importance, samplers.nearest),
+            Resource::Sampled(&images.density, samplers.linear),
+        ];
+        write_set(&rec.cx.device, set, &resources);
+        set
+    }
+
+    pub fn retire(self, bag: &mut Retired) {
+        self.sets.retire(bag);
+        bag.push(Handle::SetLayout(self.layout));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn tables_fill_the_atlas_without_overlap() {
+        for (count, limit) in [(1, 256), (4, 256), (3, 256), (64, 2048), (0, 256)] {
+            let mut seen = std::collections::HashSet::new();
+            for i in 0..count {
+                let (at, size) = place(i, count, limit).unwrap();
+                assert!(at[0] < size[0] && at[1] < size[1] && seen.insert(at));
+                assert!(size[0] * 90 <= limit && size[1] * 90 <= limit);
+            }
+        }
+        assert_eq!(place(0, 5, 256), None);
+    }
+
+    #[test]
+    fn tiles_stand_side_by_side() {
+        let tiles = [1, 2, 3, 4, 5, 6, 7, 8]; // two tiles of 2 x 2
+        assert_eq!(side_by_side([tiles.as_slice()].into_iter(), 2, 2), [1, 2, 5, 6, 3, 4, 7, 8]);
+    }
+}

@@ -1,0 +1,43 @@
+//! The frame's passes, one file each, all of one shape: name, push constants, `Io` (all that it reads and writes), the
+//! pass, `new`, `record`.
+
+pub mod classify;
+pub mod curvature;
+pub mod environment;
+pub mod gbuffer;
+pub mod materials;
+pub mod modules;
+pub mod resolve;
+pub mod shade;
+pub mod tonemap;
+
+use crate::gpu::pipeline::{BridgeLayouts, Interface, Modules};
+use crate::gpu::retire::Build;
+use bytemuck::{Pod, Zeroable};
+
+/// What every pass knows of the frame (`glsl/include/frame.glsl`, std140).
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+pub(crate) struct FrameUniform {
+    pub world_from_view: [[f32; 4]; 3],
+    pub eye: [f32; 4],
+    pub ray: [f32; 4],
+    pub extent: [u32; 4],
+    pub sampling: [u32; 4],
+    pub environment: [f32; 4],
+}
+
+/// What passes are built from.
+pub(crate) struct PassContext<'a, 'b> {
+    pub build: &'a mut Build<'b>,
+    pub modules: &'a Modules,
+    pub bridge: BridgeLayouts,
+    pub slots: usize,
+}
+
+/// The shader interfaces of all compute modules, for tests and host profilers.
+pub fn interfaces() -> Vec<Interface> {
+    let mut all = vec![curvature::INTERFACE, classify::INTERFACE, shade::INTERFACE, resolve::INTERFACE];
+    all.extend(tonemap::INTERFACES);
+    all
+}

@@ -1,0 +1,28 @@
+//! The compiled modules of `spirv/`, embedded.
+
+macro_rules! modules {
+    ($($name:literal),* $(,)?) => {
+        /// Names of all embedded modules, as in `spirv/NAME.spv`.
+        pub const NAMES: &[&str] = &[$($name),*];
+
+        /// The bytes of module `name`.
+        pub(crate) fn spirv(name: &str) -> Option<&'static [u8]> {
+            match name {
+                $($name => Some(include_bytes!(concat!("../../spirv/", $name, ".spv"))),)*
+                _ => None,
+            }
+        }
+    };
+}
+
+modules! {
+    "gbuffer.vert",
+    "gbuffer.frag",
+    "curvature.comp",
+    "classify.comp",
+    "shade.comp",
+    "resolve.comp",
+    "tonemap.rgba8.comp",
+    "tonemap.rgba16f.comp",
+    "tonemap.rgba32f.comp",
+}

@@ -1,0 +1,97 @@
+//! Pass 8: reflected radiance of the listed samples (Bagher 2011, equations 1 and 2, section 3.3).
+
+use crate::config::Estimator;
+use crate::error::Result;
+use crate::gpu::access::Access;
+use crate::gpu::buffer::Buffer;
+use crate::gpu::image::Image;
+use crate::gpu::pipeline::{BridgeSets, ComputePipeline, Interface, Resource};
+use crate::gpu::recorder::Recorder;
+use crate::gpu::retire::Retired;
+use crate::gpu::sampler::Samplers;
+use crate::pass::PassContext;
+use crate::pass::environment::EnvironmentImages;
+use crate::pass::materials::MaterialImages;
+use ash::vk::DescriptorType as D;
+use bytemuck::{Pod, Zeroable};
+
+/// Pass, shader, label and timer name.
+pub const NAME: &str = "shade";
+
+/// Shader interface.
+pub const INTERFACE: Interface = Interface {
+    name: NAME,
+    local_size: [64, 1, 1],
+    push_bytes: size_of::<Push>() as u32,
+    gbuffer: true,
+    materials: true,
+    own: &[
+        D::UNIFORM_BUFFER,
+        D::COMBINED_IMAGE_SAMPLER,
+        D::COMBINED_IMAGE_SAMPLER,
+        D::STORAGE_BUFFER,
+        D::STORAGE_BUFFER,
+        D::STORAGE_IMAGE,
+    ],
+};
+
+#[repr(C)]
+#[derive(Clone, Copy, Pod, Zeroable)]
+struct Push {
+    brdf_samples: u32,
+    environment_samples: u32,
+}
+
+pub(crate) struct Io<'a> {
+    pub frame: &'a Buffer,
+    pub bridge: BridgeSets,
+    pub samplers: &'a Samplers,
+    pub environment: &'a EnvironmentImages,
+    pub materials: &'a MaterialImages,
+    pub arguments: &'a Buffer,
+    pub list: &'a Buffer,
+    /// (reflectance, environment) directions a sample.
+    pub directions: [u32; 2],
+    /// Out: linear radiance where listed.
+    pub radiance: &'a Image,
+}
+
+pub(crate) struct Shade(ComputePipeline);
+
+impl Shade {
+    pub fn new(p: &mut PassContext<'_, '_>, estimator: Estimator) -> Result<Self> {
+        let constant = match estimator {
+            Estimator::Mis => 0,
+            Estimator::Brdf => 1,
+            Estimator::BrdfRandom => 2,
+        };
+        Ok(Self(ComputePipeline::new(p.build, p.modules, &INTERFACE, p.bridge, p.slots, &[constant])?))
+    }
+
+    pub fn record(&self, rec: &mut Recorder<'_>, io: &Io<'_>) {
+        rec.begin(NAME);
+        io.environment.sampled(rec);
+        io.materials.sampled(rec);
+        rec.buffer(io.arguments, Access::INDIRECT);
+        rec.buffer(io.arguments, Access::COMPUTE_READ);
+        rec.buffer(io.list, Access::COMPUTE_READ);
+        rec.overwrite(io.radiance, Access::COMPUTE_WRITE);
+        rec.flush();
+        let resources = [
+            Resource::Uniform(io.frame),
+            Resource::Sampled(&io.environment.map, io.samplers.linear),
+            Resource::Sampled(&io.environment.alias, io.samplers.nearest),
+            Resource::Buffer(io.arguments),
+            Resource::Buffer(io.list),
+            Resource::Storage(io.radiance.view),
+        ];
+        let [brdf_samples, environment_samples] = io.directions;
+        self.0.bind(rec, io.bridge, &resources, &Push { brdf_samples, environment_samples });
+        self.0.dispatch_indirect(rec, io.arguments);
+        rec.end();
+    }
+
+    pub fn retire(self, bag: &mut Retired) {
+        self.0.retire(bag);
+    }
+}

@@ -1,0 +1,135 @@
+//! The frame's arithmetic: extents, image descriptions, memory footprint. No GPU.
+
+use crate::config::{Config, GBufferSource};
+use crate::gpu::image::ImageDesc;
+use ash::vk;
+
+/// Sizes that follow from a [`Config`].
+#[derive(Clone, Debug)]
+pub(crate) struct Plan {
+    /// Shading samples.
+    pub shading: [u32; 2],
+    /// The renderer's own G-buffer: surface, ids, coordinate, derivative, depth.
+    pub gbuffer: Option<[ImageDesc; 5]>,
+    pub curvature: Option<ImageDesc>,
+    pub radiance: ImageDesc,
+    pub resolved: ImageDesc,
+}
+
+/// One row of the memory footprint.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct FootprintRow {
+    /// Image or buffer.
+    pub name: &'static str,
+    /// Bytes without the driver's padding.
+    pub bytes: u64,
+}
+
+/// Device memory that a renderer takes at creation, before environments and materials.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Footprint {
+    /// Every resource.
+    pub rows: Vec<FootprintRow>,
+}
+
+impl Footprint {
+    /// Sum over the rows in bytes.
+    pub fn total(&self) -> u64 {
+        self.rows.iter().map(|r| r.bytes).sum()
+    }
+}
+
+/// Bytes of the arguments of the indirect dispatch: groups in x, y, z and the number of listed samples.
+pub(crate) const ARGUMENT_BYTES: u64 = 16;
+
+impl Plan {
+    pub fn of(config: &Config) -> Self {
+        let shading = config.extent.map(|e| e.saturating_mul(config.samples_per_side));
+        let image = |name, format, [w, h]: [u32; 2], usage| ImageDesc { name, format, extent: [w, h, 1], usage };
+        let sampled = vk::ImageUsageFlags::SAMPLED | vk::ImageUsageFlags::TRANSFER_SRC;
+        let target = sampled | vk::ImageUsageFlags::COLOR_ATTACHMENT;
+        let storage = sampled | vk::ImageUsageFlags::STORAGE;
+        let own = matches!(config.gbuffer, GBufferSource::Draws);
+        Self {
+            shading,
+            gbuffer: own.then(|| {
+                [
+                    image("surface", vk::Format::R32G32B32A32_SFLOAT, shading, target),
+                    image("ids", vk::Format::R32_UINT, shading, target),
+                    image("coordinate", vk::Format::R32G32_SFLOAT, shading, target),
+                    image("derivative", vk::Format::R32G32B32A32_SFLOAT, shading, target),
+                    image("depth", vk::Format::D32_SFLOAT, shading, vk::ImageUsageFlags::DEPTH_STENCIL_ATTACHMENT),
+                ]
+            }),
+            curvature: config.curvature.then(|| image("curvature", vk::Format::R16G16B16A16_SFLOAT, shading, storage)),
+            radiance: image("radiance", vk::Format::R32G32B32A32_SFLOAT, shading, storage),
+            resolved: image("resolved", vk::Format::R32G32B32A32_SFLOAT, config.extent, storage),
+        }
+    }
+
+    fn images(&self) -> impl Iterator<Item = &ImageDesc> {
+        self.gbuffer.iter().flatten().chain(&self.curvature).chain([&self.radiance, &self.resolved])
+    }
+
+    /// Bytes of the list of samples to shade.
+    pub fn list_bytes(&self) -> u64 {
+        4 * u64::from(self.shading[0]) * u64::from(self.shading[1])
+    }
+
+    /// (brdf, environment) directions of a shaded sample.
+    pub fn directions(config: &Config) -> [u32; 2] {
+        match config.estimator {
+            crate::Estimator::Mis => [config.directions.div_ceil(2), config.directions / 2],
+            _ => [config.directions, 0],
+        }
+    }
+}
+
+/// What a renderer of `config` will allocate at creation: pure arithmetic.
+pub fn memory_footprint(config: &Config) -> Footprint {
+    let plan = Plan::of(config);
+    let mut rows: Vec<_> = plan.images().map(|d| FootprintRow { name: d.name, bytes: d.bytes() }).collect();
+    rows.push(FootprintRow { name: "list", bytes: plan.list_bytes() });
+    rows.push(FootprintRow { name: "arguments", bytes: ARGUMENT_BYTES });
+    rows.push(FootprintRow {
+        name: "frame",
+        bytes: config.frames_in_flight as u64 * size_of::<crate::pass::FrameUniform>() as u64,
+    });
+    Footprint { rows }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn footprint_grows_with_samples_and_extent() {
+        let base = Config::new([640, 360]);
+        let pixels = 640 * 360;
+        let list = |f: &Footprint| f.rows.iter().find(|r| r.name == "list").map(|r| r.bytes);
+        assert_eq!(list(&memory_footprint(&base)), Some(4 * pixels));
+        let fine = Config { samples_per_side: 4, ..base.clone() };
+        assert_eq!(list(&memory_footprint(&fine)), Some(16 * 4 * pixels));
+        // surface, derivative, radiance 16 bytes; coordinate 8; ids, depth, list 4; resolved 16
+        assert_eq!(memory_footprint(&base).total(), pixels * (3 * 16 + 8 + 3 * 4 + 16) + 16 + 2 * 128);
+    }
+
+    #[test]
+    fn directions_are_split_without_loss() {
+        for n in [2, 3, 64, 65] {
+            let [b, e] = Plan::directions(&Config { directions: n, ..Config::new([1, 1]) });
+            assert_eq!(b + e, n);
+            assert!(b - e <= 1);
+        }
+    }
+
+    #[test]
+    fn impossible_settings_name_the_field() {
+        let base = Config::new([0, 4]);
+        assert!(base.validate().unwrap_err().to_string().contains("Config::extent"));
+        let base = Config { directions: 1, ..Config::new([4, 4]) };
+        assert!(base.validate().unwrap_err().to_string().contains("Config::directions"));
+        assert!(Config { samples_per_side: 3, ..Config::new([4, 4]) }.validate().is_err());
+        assert!(Config { samples_per_side: 4, ..Config::new([16384, 1]) }.validate().is_err());
+    }
+}

@@ -1,0 +1,417 @@
+//! The frame, readable top to bottom: which pass, in which order, on which images.
+
+use crate::config::{Config, GBufferSource};
+use crate::error::{Error, Result};
+use crate::gpu::access::{Access, ImageRef};
+use crate::gpu::buffer::Buffer;
+use crate::gpu::context::{Context, Host};
+#[cfg(feature = "offline")]
+use crate::gpu::image::Image;
+use crate::gpu::memory::{HostAllocator, Location};
+use crate::gpu::pipeline::{BridgeLayouts, BridgeSets};
+use crate::gpu::recorder::{Recorder, States};
+use crate::gpu::retire::{Build, Retired};
+use crate::gpu::sampler::Samplers;
+use crate::gpu::timer::{FrameTimings, GpuTimer};
+use crate::pass::environment::{EnvironmentImages, EnvironmentUpload};
+use crate::pass::gbuffer::{self, Draw, GBuffer};
+use crate::pass::materials::{MaterialBridge, MaterialImages, MaterialsUpload};
+use crate::pass::{FrameUniform, PassContext, classify, curvature, resolve, shade, tonemap};
+use crate::plan::Plan;
+use crate::reflectance::Model;
+use crate::sampling::LatLong;
+use crate::targets::Targets;
+use crate::view::View;
+use ash::vk;
+
+/// Where this frame's G-buffer comes from; must match [`Config::gbuffer`].
+#[derive(Clone, Copy)]
+pub enum GBufferInput<'a> {
+    /// Meshes to rasterise.
+    Draws(&'a [Draw]),
+    /// The host's own.
+    Host {
+        /// Set 0, allocated with the layout of [`GBufferSource::Host`], unchanged until the frame has finished.
+        set: vk::DescriptorSet,
+        /// The images in it: sampled in compute between their entry and exit.
+        images: &'a [ImageRef],
+    },
+}
+
+/// Where the image goes.
+#[derive(Clone, Copy)]
+pub struct Output {
+    /// A storage image of one of [`tonemap::FORMATS`] and of [`Config::extent`].
+    pub image: ImageRef,
+    /// Linear or display values.
+    pub transfer: tonemap::Transfer,
+}
+
+/// How the environment is used in a frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct EnvironmentUse {
+    /// Factor on radiance.
+    pub intensity: f32,
+    /// Degrees about +Y.
+    pub rotation: f32,
+    /// Whether the background shows it; black otherwise.
+    pub visible: bool,
+}
+
+impl Default for EnvironmentUse {
+    fn default() -> Self {
+        Self { intensity: 1.0, rotation: 0.0, visible: false }
+    }
+}
+
+/// Everything that changes from frame to frame.
+#[derive(Clone, Copy)]
+pub struct FrameInputs<'a> {
+    /// Which of [`Config::frames_in_flight`] slots; the work last recorded with it has finished.
+    pub slot: usize,
+    /// Camera.
+    pub view: View,
+    /// Surfaces.
+    pub gbuffer: GBufferInput<'a>,
+    /// Environment.
+    pub environment: EnvironmentUse,
+    /// Seed and frame number of the sample points.
+    pub seed: [u32; 2],
+    /// The host's image; `None` leaves the result in the renderer's own.
+    pub output: Option<Output>,
+}
+
+/// Passes of the frame.
+struct Passes {
+    gbuffer: Option<GBuffer>,
+    curvature: Option<curvature::Curvature>,
+    classify: classify::Classify,
+    shade: shade::Shade,
+    resolve: resolve::Resolve,
+    tonemap: tonemap::Tonemap,
+}
+
+/// The renderer: records frames into the host's command buffers. It never submits and never waits.
+pub struct Renderer {
+    cx: Context,
+    config: Config,
+    states: States,
+    timer: GpuTimer,
+    timings: Option<FrameTimings>,
+    pass_bytes: Vec<(&'static str, u64)>,
+    samplers: Samplers,
+    bridge: MaterialBridge,
+    uniforms: Vec<Buffer>,
+    passes: Passes,
+    targets: Targets,
+    environment: Option<EnvironmentImages>,
+    materials: Option<MaterialImages>,
+}
+
+impl Renderer {
+    /// Creates pipelines and images; nothing is recorded or submitted.
+    ///
+    /// # Errors
+    /// [`Error::InvalidInput`] for a setting out of range, [`Error::MissingRequirements`] with every gap of the device,
+    /// [`Error::Allocation`], [`Error::Shader`] or [`Error::Vulkan`]. Nothing is left behind.
+    ///
+    /// # Safety
+    /// The handles in `host` are alive, have the features of [`crate::Requirements`] enabled, and outlive the renderer;
+    /// `memory` allocates on the same device.
+    pub unsafe fn new(host: &Host<'_>, config: &Config, memory: &mut dyn HostAllocator) -> Result<Self> {
+        config.validate()?;
+        // SAFETY: as the caller promises.
+        unsafe { crate::Requirements::of(config).check(host.instance, host.physical_device) }?;
+        let cx = Context::new(host)?;
+        let slots = config.frames_in_flight;
+        let parts = Build::run(&cx, memory, |build| {
+            let timer = GpuTimer::new(build, slots)?;
+            let samplers = Samplers::new(build)?;
+            let bridge = MaterialBridge::new(build, slots)?;
+            let uniforms = (0..slots)
+                .map(|_| {
+                    let size = size_of::<FrameUniform>() as u64;
+                    Buffer::new(build, "frame", size, vk::BufferUsageFlags::UNIFORM_BUFFER, Location::Upload)
+                })
+                .collect::<Result<Vec<_>>>()?;
+            let passes = Passes::new(build, config, bridge.layout)?;
+            Ok((timer, samplers, bridge, uniforms, passes, Targets::new(build, config)?))
+        })?;
+        let (timer, samplers, bridge, uniforms, passes, targets) = parts;
+        Ok(Self {
+            cx,
+            config: config.clone(),
+            states: States::default(),
+            timer,
+            timings: None,
+            pass_bytes: Vec::new(),
+            samplers,
+            bridge,
+            uniforms,
+            passes,
+            targets,
+            environment: None,
+            materials: None,
+        })
+    }
+
+    /// Replaces the environment: creates its images and records their upload. The bag holds the staging memory and the
+    /// former environment.
+    ///
+    /// # Errors
+    /// As [`Self::new`]; the former environment stays then.
+    ///
+    /// # Safety
+    /// `cmd` is recording outside a render pass, and is submitted before any frame recorded afterwards.
+    pub unsafe fn record_environment(
+        &mut self,
+        cmd: vk::CommandBuffer,
+        map: &LatLong,
+        memory: &mut dyn HostAllocator,
+    ) -> Result<Retired> {
+        let upload = Build::run(&self.cx, memory, |build| EnvironmentUpload::new(build, map))?;
+        let mut bag = Retired::default();
+        let mut rec = Recorder::new(&self.cx, cmd, 0, &mut self.states, None);
+        rec.begin(crate::pass::environment::NAME);
+        let fresh = upload.record(&mut rec, &mut bag);
+        rec.end();
+        if let Some(former) = self.environment.replace(fresh) {
+            former.retire(&mut self.states, &mut bag);
+        }
+        Ok(bag)
+    }
+
+    /// Replaces the materials: builds their importance tables and records the uploads. Draws and G-buffers name them by
+    /// index. The bag holds the staging memory and the former materials.
+    ///
+    /// # Errors
+    /// As [`Self::new`]; the former materials stay then.
+    ///
+    /// # Safety
+    /// As [`Self::record_environment`].
+    pub unsafe fn record_materials(
+        &mut self,
+        cmd: vk::CommandBuffer,
+        models: &[Model],
+        memory: &mut dyn HostAllocator,
+    ) -> Result<Retired> {
+        let upload = Build::run(&self.cx, memory, |build| MaterialsUpload::new(build, models))?;
+        let mut bag = Retired::default();
+        let mut rec = Recorder::new(&self.cx, cmd, 0, &mut self.states, None);
+        rec.begin(crate::pass::materials::NAME);
+        let fresh = upload.record(&mut rec, &mut bag);
+        rec.end();
+        if let Some(former) = self.materials.replace(fresh) {
+            former.retire(&mut self.states, &mut bag);
+        }
+        Ok(bag)
+    }
+
+    /// Records one frame.
+    ///
+    /// # Errors
+    /// [`Error::CallOrder`] before an environment and materials were recorded; [`Error::InvalidInput`] for inputs that do
+    /// not fit the configuration, with nothing recorded then except the timer's reset.
+    ///
+    /// # Safety
+    /// `cmd` is recording outside a render pass on the queue family of [`Host`]; command buffers are submitted in the order
+    /// in which they were recorded; the work last recorded with `inputs.slot` has finished; handles in `inputs` are alive
+    /// until this frame has finished. Bound pipelines, descriptor sets 0 to 2, push constants and dynamic state are lost.
+    pub unsafe fn record(&mut self, cmd: vk::CommandBuffer, inputs: &FrameInputs<'_>) -> Result<()> {
+        self.check(inputs)?;
+        let before = "record_environment and record_materials";
+        let (Some(environment), Some(materials)) = (&self.environment, &self.materials) else {
+            return Err(Error::CallOrder { called: "record", before });
+        };
+        if let Some(timings) = self.timer.begin_frame(&self.cx, cmd, inputs.slot)? {
+            self.timings = Some(timings);
+        }
+        let uniform = frame_uniform(&self.config, self.targets.plan.shading, inputs);
+        let frame = &mut self.uniforms[inputs.slot];
+        frame.bytes_mut().copy_from_slice(bytemuck::bytes_of(&uniform));
+        let frame = &self.uniforms[inputs.slot];
+        let (samplers, targets, passes) = (&self.samplers, &self.targets, &self.passes);
+        let rec = &mut Recorder::new(&self.cx, cmd, inputs.slot, &mut self.states, Some(&mut self.timer));
+
+        // 1  Surfaces: our own G-buffer from draws, or the host's behind its bridge.
+        let gbuffer = match (inputs.gbuffer, &passes.gbuffer, &targets.gbuffer) {
+            (GBufferInput::Draws(draws), Some(pass), Some(images)) => {
+                pass.record(rec, &gbuffer::Io { draws, clip_from_world: inputs.view.clip_from_world(), images });
+                pass.bridge(rec, images, samplers)
+            }
+            (GBufferInput::Host { set, images }, None, None) => {
+                images.iter().for_each(|image| rec.host_image(image, Access::COMPUTE_SAMPLED));
+                set
+            }
+            _ => return Err(Error::invalid("gbuffer", format!("as {:?}", self.config.gbuffer), "the other kind")),
+        };
+        let bridge = BridgeSets { gbuffer, materials: self.bridge.write(rec, materials, samplers) };
+        if let (Some(pass), Some(curvature)) = (&passes.curvature, &targets.curvature) {
+            pass.record(rec, &curvature::Io { frame, bridge, curvature });
+        }
+
+        // 6  Which samples to shade.
+        let (arguments, list) = (&targets.arguments, &targets.list);
+        passes.classify.record(rec, &classify::Io { frame, bridge, shading: targets.plan.shading, arguments, list });
+
+        // 8  Their radiance.
+        let radiance = &targets.radiance;
+        let directions = Plan::directions(&self.config);
+        passes
+            .shade
+            .record(rec, &shade::Io { frame, bridge, samplers, environment, materials, arguments, list, directions, radiance });
+
+        // 9  The output.
+        let resolved = &targets.resolved;
+        passes.resolve.record(rec, &resolve::Io { frame, bridge, samplers, environment, radiance, resolved });
+        if let Some(Output { image, transfer }) = &inputs.output {
+            passes.tonemap.record(rec, &tonemap::Io { samplers, resolved, target: image, transfer: *transfer });
+            rec.release(image);
+        }
+        if let GBufferInput::Host { images, .. } = inputs.gbuffer {
+            images.iter().for_each(|image| rec.release(image));
+        }
+        self.pass_bytes = std::mem::take(&mut rec.pass_bytes);
+        Ok(())
+    }
+
+    /// Builds for another output extent. The bag holds the former images.
+    ///
+    /// # Errors
+    /// As [`Self::new`]; the renderer keeps its former extent then.
+    pub fn resize(&mut self, extent: [u32; 2], memory: &mut dyn HostAllocator) -> Result<Retired> {
+        let config = Config { extent, ..self.config.clone() };
+        config.validate()?;
+        let fresh = Build::run(&self.cx, memory, |build| Targets::new(build, &config))?;
+        self.config = config;
+        let mut bag = Retired::default();
+        std::mem::replace(&mut self.targets, fresh).retire(&mut self.states, &mut bag);
+        Ok(bag)
+    }
+
+    /// Settings in force.
+    pub fn config(&self) -> &Config {
+        &self.config
+    }
+
+    /// GPU times of the last frame whose slot came round again; `None` until then, or without timestamps.
+    pub fn timings(&self) -> Option<&FrameTimings> {
+        self.timings.as_ref()
+    }
+
+    /// Bytes of the images and buffers that each pass of the last recorded frame declared.
+    pub fn pass_bytes(&self) -> &[(&'static str, u64)] {
+        &self.pass_bytes
+    }
+
+    /// Gives everything back.
+    pub fn destroy(mut self) -> Retired {
+        let mut bag = Retired::default();
+        if let Some(environment) = self.environment {
+            environment.retire(&mut self.states, &mut bag);
+        }
+        if let Some(materials) = self.materials {
+            materials.retire(&mut self.states, &mut bag);
+        }
+        self.targets.retire(&mut self.states, &mut bag);
+        self.passes.retire(&mut bag);
+        self.uniforms.into_iter().for_each(|b| b.retire(&mut bag));
+        self.bridge.retire(&mut bag);
+        self.samplers.retire(&mut bag);
+        self.timer.retire(&mut bag);
+        bag
+    }
+
+    fn check(&self, inputs: &FrameInputs<'_>) -> Result<()> {
+        if inputs.slot >= self.config.frames_in_flight {
+            return Err(Error::invalid("slot", format!("below {}", self.config.frames_in_flight), inputs.slot));
+        }
+        inputs.view.validate()?;
+        let EnvironmentUse { intensity, rotation, .. } = inputs.environment;
+        if !(intensity >= 0.0 && intensity.is_finite() && rotation.is_finite()) {
+            return Err(Error::invalid("environment", "finite rotation and intensity >= 0", format!("{:?}", inputs.environment)));
+        }
+        match inputs.gbuffer {
+            GBufferInput::Draws(draws) => gbuffer::check(draws)?,
+            GBufferInput::Host { images, .. } => {
+                let shading = self.targets.plan.shading;
+                if let Some(i) = images.iter().position(|image| image.extent != shading) {
+                    return Err(Error::invalid(format!("gbuffer.images[{i}].extent"), format!("{shading:?}"), format!("{:?}", images[i].extent)));
+                }
+            }
+        }
+        match &inputs.output {
+            Some(output) => tonemap::check(&output.image, output.transfer, self.config.extent),
+            None => Ok(()),
+        }
+    }
+
+    /// One of the renderer's own colour images of the last frame, by name.
+    #[cfg(feature = "offline")]
+    pub(crate) fn image(&self, name: &str) -> Option<&Image> {
+        self.targets.image(name)
+    }
+
+    /// The number of samples to shade and the arguments of their dispatch.
+    #[cfg(feature = "offline")]
+    pub(crate) fn arguments(&self) -> &Buffer {
+        &self.targets.arguments
+    }
+
+    /// A recorder that continues from the last frame's uses, for read-back.
+    #[cfg(feature = "offline")]
+    pub(crate) fn recorder(&mut self, cmd: vk::CommandBuffer) -> Recorder<'_> {
+        Recorder::new(&self.cx, cmd, 0, &mut self.states, None)
+    }
+}
+
+impl Passes {
+    fn new(build: &mut Build<'_>, config: &Config, materials: vk::DescriptorSetLayout) -> Result<Self> {
+        let none = BridgeLayouts { gbuffer: vk::DescriptorSetLayout::null(), materials };
+        let mut p = PassContext { build, modules: &config.modules, bridge: none, slots: config.frames_in_flight };
+        let gbuffer = match config.gbuffer {
+            GBufferSource::Draws => Some(GBuffer::new(&mut p)?),
+            GBufferSource::Host { .. } => None,
+        };
+        p.bridge.gbuffer = match (&gbuffer, config.gbuffer) {
+            (_, GBufferSource::Host { layout }) => layout,
+            (Some(own), GBufferSource::Draws) => own.layout,
+            (None, GBufferSource::Draws) => vk::DescriptorSetLayout::null(),
+        };
+        Ok(Self {
+            gbuffer,
+            curvature: config.curvature.then(|| curvature::Curvature::new(&mut p)).transpose()?,
+            classify: classify::Classify::new(&mut p)?,
+            shade: shade::Shade::new(&mut p, config.estimator)?,
+            resolve: resolve::Resolve::new(&mut p)?,
+            tonemap: tonemap::Tonemap::new(&mut p)?,
+        })
+    }
+
+    fn retire(self, bag: &mut Retired) {
+        if let Some(pass) = self.gbuffer {
+            pass.retire(bag);
+        }
+        if let Some(pass) = self.curvature {
+            pass.retire(bag);
+        }
+        self.classify.retire(bag);
+        self.shade.retire(bag);
+        self.resolve.retire(bag);
+        self.tonemap.retire(bag);
+    }
+}
+
+fn frame_uniform(config: &Config, shading: [u32; 2], inputs: &FrameInputs<'_>) -> FrameUniform {
+    let world = inputs.view.world_from_view();
+    let EnvironmentUse { intensity, rotation, visible } = inputs.environment;
+    FrameUniform {
+        world_from_view: [world.x_axis, world.y_axis, world.z_axis].map(|c| c.to_array()),
+        eye: world.w_axis.to_array(),
+        ray: inputs.view.ray().to_array(),
+        extent: [shading[0], shading[1], config.samples_per_side, u32::from(visible)],
+        sampling: [inputs.seed[0], inputs.seed[1], config.directions, 0],
+        // A turn about +Y moves the map towards smaller u.
+        environment: [-rotation / 360.0, intensity, 0.0, 0.0],
+    }
+}
