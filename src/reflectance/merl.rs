@@ -176,11 +176,7 @@ impl Angles {
         // Tangents about the half vector; the difference of the directions is orthogonal to it.
         let x = difference.dot(DVec3::new(azimuth.x * h.z, azimuth.y * h.z, -sine));
         let y = difference.dot(DVec3::new(-azimuth.y, azimuth.x, 0.0));
-        Self {
-            theta_half: sine.atan2(h.z),
-            theta_diff: difference.length().atan2(sum.length()),
-            phi_diff: y.atan2(x),
-        }
+        Self { theta_half: sine.atan2(h.z), theta_diff: difference.length().atan2(sum.length()), phi_diff: y.atan2(x) }
     }
 
     /// Directions `(wi, wo)` with these angles and the half vector in the xz-plane; they can lie below the horizon.

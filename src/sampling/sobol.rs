@@ -68,8 +68,7 @@ mod tests {
     #[test]
     fn second_dimension_is_that_of_the_direction_numbers() {
         // Primitive polynomial x + 1 (degree 1, no inner coefficients), first direction number 1/2: v_k+1 = v_k ^ (v_k >> 1).
-        let directions: Vec<u32> =
-            std::iter::successors(Some(0x8000_0000u32), |v| Some(v ^ (v >> 1))).take(32).collect();
+        let directions: Vec<u32> = std::iter::successors(Some(0x8000_0000u32), |v| Some(v ^ (v >> 1))).take(32).collect();
         let sobol = |i: u32| (0..32).filter(|k| i >> k & 1 == 1).fold(0, |x, k| x ^ directions[k]);
         for i in (0..4096).chain((0..4096).map(|k| hash(k) | 1 << 31)) {
             assert_eq!(reversed_1(i).reverse_bits(), sobol(i), "point {i}");
