@@ -72,7 +72,12 @@ impl Config {
         let side = self.samples_per_side;
         check(matches!(side, 1 | 2 | 4), "samples_per_side", "1, 2 or 4", side.to_string())?;
         let fits = |e: u32| (1..=16384).contains(&e) && e * side <= 65535;
-        check(self.extent.into_iter().all(fits), "extent", "1 to 16384 pixels a side", format!("{}x{}", self.extent[0], self.extent[1]))?;
+        check(
+            self.extent.into_iter().all(fits),
+            "extent",
+            "1 to 16384 pixels a side",
+            format!("{}x{}", self.extent[0], self.extent[1]),
+        )?;
         check((1..=8).contains(&self.frames_in_flight), "frames_in_flight", "1 to 8", self.frames_in_flight.to_string())?;
         let least = if self.estimator == Estimator::Mis { 2 } else { 1 };
         check((least..=65536).contains(&self.directions), "directions", &format!("{least} to 65536"), self.directions.to_string())

@@ -336,7 +336,11 @@ impl Renderer {
             GBufferInput::Host { images, .. } => {
                 let shading = self.targets.plan.shading;
                 if let Some(i) = images.iter().position(|image| image.extent != shading) {
-                    return Err(Error::invalid(format!("gbuffer.images[{i}].extent"), format!("{shading:?}"), format!("{:?}", images[i].extent)));
+                    return Err(Error::invalid(
+                        format!("gbuffer.images[{i}].extent"),
+                        format!("{shading:?}"),
+                        format!("{:?}", images[i].extent),
+                    ));
                 }
             }
         }
@@ -358,10 +362,17 @@ impl Renderer {
         &self.targets.arguments
     }
 
-    /// A recorder that continues from the last frame's uses, for read-back.
     #[cfg(feature = "offline")]
-    pub(crate) fn recorder(&mut self, cmd: vk::CommandBuffer) -> Recorder<'_> {
-        Recorder::new(&self.cx, cmd, 0, &mut self.states, None)
+    pub(crate) fn context(&self) -> &Context {
+        &self.cx
+    }
+
+    /// Records copies out of the renderer's images, which continue from the last frame's uses.
+    #[cfg(feature = "offline")]
+    pub(crate) fn copy_out(&mut self, cmd: vk::CommandBuffer, copy: impl FnOnce(&Self, &mut Recorder<'_>)) {
+        let mut states = std::mem::take(&mut self.states);
+        copy(self, &mut Recorder::new(&self.cx, cmd, 0, &mut states, None));
+        self.states = states;
     }
 }
 

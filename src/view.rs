@@ -37,6 +37,10 @@ impl View {
         }
         let m = self.world_from_view();
         let rigid = (m.determinant() - 1.0).abs() < 1e-3 && m.row(3) == Vec4::W;
-        if rigid { Ok(()) } else { Err(Error::invalid("View::world_from_view", "a rotation and a translation", format!("{m:?}"))) }
+        if rigid {
+            Ok(())
+        } else {
+            Err(Error::invalid("View::world_from_view", "a rotation and a translation", format!("{m:?}")))
+        }
     }
 }

@@ -25,9 +25,8 @@ static CASES: LazyLock<Vec<Case>> = LazyLock::new(|| {
         (name, f, table)
     };
     let baked = stand_in::names().iter().map(|&n| case(n.into(), Box::new(stand_in::table(n).unwrap())));
-    let ggx = [0.01, 0.05, 0.2, 0.5].map(|alpha| {
-        case(format!("ggx {alpha}"), Box::new(Ggx { alpha, f0: DVec3::ONE, albedo: DVec3::ZERO }))
-    });
+    let ggx = [0.01, 0.05, 0.2, 0.5]
+        .map(|alpha| case(format!("ggx {alpha}"), Box::new(Ggx { alpha, f0: DVec3::ONE, albedo: DVec3::ZERO })));
     let diffuse = Ggx { alpha: 1.0, f0: DVec3::ZERO, albedo: DVec3::splat(0.8) };
     baked.chain(ggx).chain([case("diffuse".into(), Box::new(diffuse)), case("black".into(), Box::new(Black))]).collect()
 });

@@ -28,18 +28,17 @@ impl Access {
     /// Read and written by atomics in a compute shader.
     pub const COMPUTE_ATOMIC: Self = Self::new(
         vk::PipelineStageFlags2::COMPUTE_SHADER,
-        vk::AccessFlags2::from_raw(vk::AccessFlags2::SHADER_STORAGE_WRITE.as_raw() | vk::AccessFlags2::SHADER_STORAGE_READ.as_raw()),
+        vk::AccessFlags2::from_raw(
+            vk::AccessFlags2::SHADER_STORAGE_WRITE.as_raw() | vk::AccessFlags2::SHADER_STORAGE_READ.as_raw(),
+        ),
         vk::ImageLayout::GENERAL,
     );
     /// A storage buffer read by a compute shader.
     pub const COMPUTE_READ: Self =
         Self::new(vk::PipelineStageFlags2::COMPUTE_SHADER, vk::AccessFlags2::SHADER_STORAGE_READ, vk::ImageLayout::GENERAL);
     /// Arguments of an indirect dispatch.
-    pub const INDIRECT: Self = Self::new(
-        vk::PipelineStageFlags2::DRAW_INDIRECT,
-        vk::AccessFlags2::INDIRECT_COMMAND_READ,
-        vk::ImageLayout::UNDEFINED,
-    );
+    pub const INDIRECT: Self =
+        Self::new(vk::PipelineStageFlags2::DRAW_INDIRECT, vk::AccessFlags2::INDIRECT_COMMAND_READ, vk::ImageLayout::UNDEFINED);
     /// Colour attachment, cleared or written.
     pub const COLOR_WRITE: Self = Self::new(
         vk::PipelineStageFlags2::COLOR_ATTACHMENT_OUTPUT,

@@ -40,12 +40,16 @@ impl Context {
                 host.instance.get_physical_device_queue_family_properties(host.physical_device),
             )
         };
-        let family = families.get(host.queue_family as usize).ok_or_else(|| {
-            Error::invalid("Host::queue_family", format!("below {}", families.len()), host.queue_family)
-        })?;
+        let family = families
+            .get(host.queue_family as usize)
+            .ok_or_else(|| Error::invalid("Host::queue_family", format!("below {}", families.len()), host.queue_family))?;
         let wanted = vk::QueueFlags::GRAPHICS | vk::QueueFlags::COMPUTE;
         if !family.queue_flags.contains(wanted) {
-            return Err(Error::invalid("Host::queue_family", "a family with graphics and compute", format!("{:?}", family.queue_flags)));
+            return Err(Error::invalid(
+                "Host::queue_family",
+                "a family with graphics and compute",
+                format!("{:?}", family.queue_flags),
+            ));
         }
         Ok(Self {
             device: host.device.clone(),

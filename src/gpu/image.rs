@@ -60,7 +60,11 @@ impl Image {
             (vk::ImageType::TYPE_2D, vk::ImageViewType::TYPE_2D, limits.max_image_dimension2_d)
         };
         if desc.extent.iter().any(|&e| e == 0 || e > limit) {
-            return Err(Error::invalid(format!("extent of image {}", desc.name), format!("1 to {limit}"), format!("{:?}", desc.extent)));
+            return Err(Error::invalid(
+                format!("extent of image {}", desc.name),
+                format!("1 to {limit}"),
+                format!("{:?}", desc.extent),
+            ));
         }
         let info = vk::ImageCreateInfo::default()
             .image_type(kind)
@@ -80,8 +84,10 @@ impl Image {
         build.track_block(&block);
         // SAFETY: the block satisfies the image's requirements and is unshared.
         unsafe { device.bind_image_memory(handle, block.memory, block.offset) }.named("vkBindImageMemory")?;
-        let range = vk::ImageSubresourceRange { aspect_mask: desc.aspect(), level_count: 1, layer_count: 1, ..Default::default() };
-        let info = vk::ImageViewCreateInfo::default().image(handle).view_type(view_kind).format(desc.format).subresource_range(range);
+        let range =
+            vk::ImageSubresourceRange { aspect_mask: desc.aspect(), level_count: 1, layer_count: 1, ..Default::default() };
+        let info =
+            vk::ImageViewCreateInfo::default().image(handle).view_type(view_kind).format(desc.format).subresource_range(range);
         // SAFETY: the image is bound.
         let view = build.track(unsafe { device.create_image_view(&info, None) }.named("vkCreateImageView")?, Handle::View);
         Ok(Self { desc, handle, view, block })

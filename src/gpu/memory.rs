@@ -122,7 +122,8 @@ unsafe impl HostAllocator for DedicatedAllocator {
             .ok_or_else(|| AllocationError(format!("no memory type of {:#b} for {location:?}", requirements.memory_type_bits)))?;
         let info = vk::MemoryAllocateInfo::default().allocation_size(requirements.size).memory_type_index(index);
         // SAFETY: the device is alive; size and type come from its own requirements.
-        let memory = unsafe { self.device.allocate_memory(&info, None) }.map_err(|e| AllocationError(format!("vkAllocateMemory: {e}")))?;
+        let memory =
+            unsafe { self.device.allocate_memory(&info, None) }.map_err(|e| AllocationError(format!("vkAllocateMemory: {e}")))?;
         let mapped = if location == Location::Device {
             None
         } else {

@@ -72,7 +72,9 @@ pub(crate) fn set_layout(
 ) -> Result<vk::DescriptorSetLayout> {
     let bindings: Vec<_> = (0u32..)
         .zip(types)
-        .map(|(i, &t)| vk::DescriptorSetLayoutBinding::default().binding(i).descriptor_type(t).descriptor_count(1).stage_flags(stages))
+        .map(|(i, &t)| {
+            vk::DescriptorSetLayoutBinding::default().binding(i).descriptor_type(t).descriptor_count(1).stage_flags(stages)
+        })
         .collect();
     let info = vk::DescriptorSetLayoutCreateInfo::default().bindings(&bindings);
     // SAFETY: the device is alive.
@@ -87,7 +89,12 @@ pub(crate) struct Sets {
 }
 
 impl Sets {
-    pub fn new(build: &mut Build<'_>, layout: vk::DescriptorSetLayout, types: &[vk::DescriptorType], slots: usize) -> Result<Self> {
+    pub fn new(
+        build: &mut Build<'_>,
+        layout: vk::DescriptorSetLayout,
+        types: &[vk::DescriptorType],
+        slots: usize,
+    ) -> Result<Self> {
         if types.is_empty() {
             return Ok(Self { pool: vk::DescriptorPool::null(), sets: vec![vk::DescriptorSet::null(); slots] });
         }
@@ -127,7 +134,9 @@ pub(crate) fn write_set(device: &ash::Device, set: vk::DescriptorSet, resources:
                 .image_view(image.view)
                 .sampler(*sampler)
                 .image_layout(vk::ImageLayout::SHADER_READ_ONLY_OPTIMAL),
-            Resource::Storage(view) => vk::DescriptorImageInfo::default().image_view(*view).image_layout(vk::ImageLayout::GENERAL),
+            Resource::Storage(view) => {
+                vk::DescriptorImageInfo::default().image_view(*view).image_layout(vk::ImageLayout::GENERAL)
+            }
             _ => vk::DescriptorImageInfo::default(),
         })
         .collect();
@@ -218,10 +227,12 @@ impl ComputePipeline {
             .zip(constants)
             .map(|(i, _)| vk::SpecializationMapEntry::default().constant_id(i).offset(4 * i).size(4))
             .collect();
-        let specialization =
-            vk::SpecializationInfo::default().map_entries(&entries).data(bytemuck::cast_slice(constants));
-        let stage =
-            vk::PipelineShaderStageCreateInfo::default().stage(compute).module(module).name(MAIN).specialization_info(&specialization);
+        let specialization = vk::SpecializationInfo::default().map_entries(&entries).data(bytemuck::cast_slice(constants));
+        let stage = vk::PipelineShaderStageCreateInfo::default()
+            .stage(compute)
+            .module(module)
+            .name(MAIN)
+            .specialization_info(&specialization);
         let info = vk::ComputePipelineCreateInfo::default().stage(stage).layout(layout);
         // SAFETY: all handles are alive; the module is destroyed once, after use.
         let created = unsafe {
@@ -260,7 +271,9 @@ impl ComputePipeline {
         }
         if self.interface.push_bytes > 0 {
             // SAFETY: the range is the pipeline layout's own.
-            unsafe { device.cmd_push_constants(rec.cmd, self.layout, vk::ShaderStageFlags::COMPUTE, 0, bytemuck::bytes_of(push)) };
+            unsafe {
+                device.cmd_push_constants(rec.cmd, self.layout, vk::ShaderStageFlags::COMPUTE, 0, bytemuck::bytes_of(push))
+            };
         }
     }
 
@@ -348,7 +361,8 @@ impl RasterPipeline {
         let blend = vk::PipelineColorBlendStateCreateInfo::default().attachments(&attachments);
         let dynamic = vk::PipelineDynamicStateCreateInfo::default()
             .dynamic_states(&[vk::DynamicState::VIEWPORT, vk::DynamicState::SCISSOR]);
-        let mut rendering = vk::PipelineRenderingCreateInfo::default().color_attachment_formats(colors).depth_attachment_format(depth);
+        let mut rendering =
+            vk::PipelineRenderingCreateInfo::default().color_attachment_formats(colors).depth_attachment_format(depth);
         let info = vk::GraphicsPipelineCreateInfo::default()
             .push_next(&mut rendering)
             .stages(&stages)

@@ -117,6 +117,11 @@ impl<'a> Recorder<'a> {
         }
     }
 
+    /// Forgets a resource that is about to be destroyed.
+    pub fn forget(&mut self, handle: impl vk::Handle) {
+        self.states.forget(handle);
+    }
+
     /// One barrier for all uses declared since the last.
     pub fn flush(&mut self) {
         if self.images.is_empty() && self.buffers.is_empty() {
@@ -136,7 +141,12 @@ impl<'a> Recorder<'a> {
                     .src_queue_family_index(vk::QUEUE_FAMILY_IGNORED)
                     .dst_queue_family_index(vk::QUEUE_FAMILY_IGNORED)
                     .image(image)
-                    .subresource_range(vk::ImageSubresourceRange { aspect_mask, level_count: 1, layer_count: 1, ..Default::default() })
+                    .subresource_range(vk::ImageSubresourceRange {
+                        aspect_mask,
+                        level_count: 1,
+                        layer_count: 1,
+                        ..Default::default()
+                    })
             })
             .collect();
         let buffers: Vec<_> = self

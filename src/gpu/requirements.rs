@@ -114,7 +114,8 @@ impl Requirements {
         });
         for &(format, needed) in &self.formats {
             // SAFETY: as above.
-            let found = unsafe { instance.get_physical_device_format_properties(physical_device, format) }.optimal_tiling_features;
+            let found =
+                unsafe { instance.get_physical_device_format_properties(physical_device, format) }.optimal_tiling_features;
             rows.push(Row {
                 name: format!("{format:?}"),
                 needed: format!("{needed:?}"),

@@ -1,8 +1,8 @@
 //! Deferred destruction: nothing is destroyed while the device may still use it.
 
-use crate::gpu::memory::{Block, HostAllocator};
 use crate::error::Result;
 use crate::gpu::context::Context;
+use crate::gpu::memory::{Block, HostAllocator};
 use ash::vk;
 
 /// One thing to destroy.
@@ -85,7 +85,11 @@ pub(crate) struct Build<'a> {
 
 impl Build<'_> {
     /// Runs `construct`; on an error everything that it created is destroyed.
-    pub fn run<T>(cx: &Context, memory: &mut dyn HostAllocator, construct: impl FnOnce(&mut Build<'_>) -> Result<T>) -> Result<T> {
+    pub fn run<T>(
+        cx: &Context,
+        memory: &mut dyn HostAllocator,
+        construct: impl FnOnce(&mut Build<'_>) -> Result<T>,
+    ) -> Result<T> {
         let mut build = Build { cx, memory, created: Retired::default() };
         let result = construct(&mut build);
         let mut created = build.created;

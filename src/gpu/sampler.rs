@@ -13,7 +13,7 @@ pub(crate) struct Samplers {
 
 impl Samplers {
     pub fn new(build: &mut Build<'_>) -> Result<Self> {
-        let mut make = |filter, name: &str| {
+        let mut make = |filter, name: &str| -> Result<vk::Sampler> {
             let info = vk::SamplerCreateInfo::default()
                 .mag_filter(filter)
                 .min_filter(filter)

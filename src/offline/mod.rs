@@ -2,5 +2,7 @@
 //! The only part of the crate that creates instances, devices or queues, reads files or the environment, or prints.
 
 pub mod error;
+pub mod headless;
 pub mod mesh;
+pub mod session;
 pub mod world;

@@ -124,7 +124,11 @@ impl GBuffer {
                 .image_view(image.view)
                 .image_layout(layout)
                 .load_op(vk::AttachmentLoadOp::CLEAR)
-                .store_op(if image.desc.format == DEPTH { vk::AttachmentStoreOp::DONT_CARE } else { vk::AttachmentStoreOp::STORE })
+                .store_op(if image.desc.format == DEPTH {
+                    vk::AttachmentStoreOp::DONT_CARE
+                } else {
+                    vk::AttachmentStoreOp::STORE
+                })
                 .clear_value(clear)
         };
         let attachments = colors.map(|image| attachment(image, Access::COLOR_WRITE.layout, 0.0));
@@ -199,7 +203,11 @@ pub(crate) fn check(draws: &[Draw]) -> Result<()> {
         }
         let determinant = Mat4::from_cols_array(&draw.world_from_object).determinant();
         if !determinant.is_normal() {
-            return Err(Error::invalid(format!("draws[{i}].world_from_object"), "an invertible matrix", format!("determinant {determinant}")));
+            return Err(Error::invalid(
+                format!("draws[{i}].world_from_object"),
+                "an invertible matrix",
+                format!("determinant {determinant}"),
+            ));
         }
     }
     Ok(())

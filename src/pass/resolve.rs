@@ -22,13 +22,7 @@ pub const INTERFACE: Interface = Interface {
     push_bytes: 0,
     gbuffer: true,
     materials: false,
-    own: &[
-        D::UNIFORM_BUFFER,
-        D::COMBINED_IMAGE_SAMPLER,
-        D::COMBINED_IMAGE_SAMPLER,
-        D::COMBINED_IMAGE_SAMPLER,
-        D::STORAGE_IMAGE,
-    ],
+    own: &[D::UNIFORM_BUFFER, D::COMBINED_IMAGE_SAMPLER, D::COMBINED_IMAGE_SAMPLER, D::COMBINED_IMAGE_SAMPLER, D::STORAGE_IMAGE],
 };
 
 pub(crate) struct Io<'a> {

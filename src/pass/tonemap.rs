@@ -26,8 +26,7 @@ const fn interface(name: &'static str) -> Interface {
 }
 
 /// Shader interfaces, one a format of [`FORMATS`].
-pub const INTERFACES: [Interface; 3] =
-    [interface("tonemap.rgba8"), interface("tonemap.rgba16f"), interface("tonemap.rgba32f")];
+pub const INTERFACES: [Interface; 3] = [interface("tonemap.rgba8"), interface("tonemap.rgba16f"), interface("tonemap.rgba32f")];
 
 /// Formats that an output may have.
 pub const FORMATS: [vk::Format; 3] =

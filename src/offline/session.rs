@@ -1,0 +1,344 @@
+//! A world on a device: uploaded once, rendered frame by frame, read back.
+
+use crate::gpu::access::Access;
+use crate::gpu::buffer::Buffer;
+use crate::gpu::image::Image;
+use crate::gpu::memory::Location;
+use crate::gpu::recorder::{Recorder, States};
+use crate::gpu::retire::{Build, Retired};
+use crate::gpu::timer::FrameTimings;
+use crate::gpu::upload::BufferUpload;
+use crate::offline::error::{Error, Result};
+use crate::offline::headless::Headless;
+use crate::offline::mesh::Mesh;
+use crate::offline::world::{Camera, World};
+use crate::renderer::{EnvironmentUse, FrameInputs, GBufferInput, Renderer};
+use crate::sampling::LatLong;
+use crate::{Config, Draw, View};
+use ash::vk;
+use glam::{DMat4, DVec4, Mat4};
+use std::collections::HashMap;
+use std::sync::Arc;
+use std::time::Instant;
+
+/// Near plane of the rasteriser as a fraction of the scene's reach; there is no far plane.
+const NEAR: f64 = 1e-3;
+
+struct MeshBuffers {
+    positions: Buffer,
+    normals: Buffer,
+    coordinates: Buffer,
+    indices: Buffer,
+    count: u32,
+}
+
+/// Milliseconds of set-up work by name.
+pub type SetupTimes = Vec<(&'static str, f64)>;
+
+/// A renderer with a world's meshes, materials and environment on the device.
+pub struct Session {
+    headless: Headless,
+    renderer: Option<Renderer>,
+    meshes: Vec<MeshBuffers>,
+    draws: Vec<Draw>,
+    view: View,
+    environment: EnvironmentUse,
+    setup: SetupTimes,
+}
+
+impl Session {
+    /// Uploads `world` for frames of `config`, which must use draws.
+    ///
+    /// # Errors
+    /// The library's or the device's.
+    pub fn new(mut headless: Headless, world: &World, config: &Config) -> Result<Self> {
+        let mut setup = SetupTimes::new();
+        let clock = Instant::now();
+        let mut renderer = {
+            let (host, memory) = headless.parts()?;
+            // SAFETY: the handles live in `headless`, which outlives the renderer: `drop` destroys the renderer first.
+            unsafe { Renderer::new(&host, config, memory) }?
+        };
+        setup.push(("pipelines", milliseconds(clock)));
+
+        let clock = Instant::now();
+        let models: Vec<_> = world.materials.iter().map(|m| m.model.clone()).collect();
+        // SAFETY: the command buffer is recording and submitted at once.
+        headless.submit(|cmd, memory| Ok(unsafe { renderer.record_materials(cmd, &models, memory) }?))?;
+        setup.push((crate::pass::materials::NAME, milliseconds(clock)));
+
+        let clock = Instant::now();
+        let dark = LatLong::new(1, 1, vec![[0.0; 3]])?;
+        let map = world.environment.as_ref().map_or(&dark, |e| &e.map);
+        // SAFETY: as above.
+        headless.submit(|cmd, memory| Ok(unsafe { renderer.record_environment(cmd, map, memory) }?))?;
+        setup.push((crate::pass::environment::NAME, milliseconds(clock)));
+
+        let clock = Instant::now();
+        let mut session = Self {
+            headless,
+            renderer: Some(renderer),
+            meshes: Vec::new(),
+            draws: Vec::new(),
+            view: view(&world.camera, config.extent, near(world)),
+            environment: world.environment.as_ref().map_or(EnvironmentUse::default(), |e| EnvironmentUse {
+                intensity: e.intensity as f32,
+                rotation: e.rotation as f32,
+                visible: e.visible,
+            }),
+            setup,
+        };
+        session.upload_objects(world)?;
+        session.setup.push(("meshes", milliseconds(clock)));
+        Ok(session)
+    }
+
+    fn upload_objects(&mut self, world: &World) -> Result<()> {
+        let mut known: HashMap<*const Mesh, usize> = HashMap::new();
+        for (number, object) in (0u32..).zip(&world.objects) {
+            let index = match known.get(&Arc::as_ptr(&object.mesh)) {
+                Some(&index) => index,
+                None => {
+                    let buffers = self.upload_mesh(&object.mesh)?;
+                    self.meshes.push(buffers);
+                    known.insert(Arc::as_ptr(&object.mesh), self.meshes.len() - 1);
+                    self.meshes.len() - 1
+                }
+            };
+            let mesh = &self.meshes[index];
+            self.draws.push(Draw {
+                positions: (mesh.positions.handle, 0),
+                normals: (mesh.normals.handle, 0),
+                coordinates: (mesh.coordinates.handle, 0),
+                indices: (mesh.indices.handle, 0),
+                index_count: mesh.count,
+                world_from_object: object.transform.to_cols_array(),
+                material: object.material as u32,
+                object: number,
+            });
+        }
+        Ok(())
+    }
+
+    fn upload_mesh(&mut self, mesh: &Mesh) -> Result<MeshBuffers> {
+        let renderer = self.renderer.as_mut().ok_or_else(closed)?;
+        let mut uploaded = None;
+        self.headless.submit(|cmd, memory| {
+            let vertex = vk::BufferUsageFlags::VERTEX_BUFFER;
+            let uploads = Build::run(renderer.context(), memory, |build| {
+                Ok([
+                    BufferUpload::new(build, "positions", vertex, bytemuck::cast_slice(&mesh.positions))?,
+                    BufferUpload::new(build, "normals", vertex, bytemuck::cast_slice(&mesh.normals))?,
+                    BufferUpload::new(build, "coordinates", vertex, bytemuck::cast_slice(&mesh.uvs))?,
+                    BufferUpload::new(build, "indices", vk::BufferUsageFlags::INDEX_BUFFER, bytemuck::cast_slice(&mesh.indices))?,
+                ])
+            })?;
+            let mut bag = Retired::default();
+            // The wait at the end of the submission is all the synchronization that vertex input needs.
+            let mut states = States::default();
+            let mut rec = Recorder::new(renderer.context(), cmd, 0, &mut states, None);
+            let [positions, normals, coordinates, indices] = uploads.map(|u| u.record(&mut rec, &mut bag));
+            uploaded = Some(MeshBuffers { positions, normals, coordinates, indices, count: mesh.indices.len() as u32 });
+            Ok(bag)
+        })?;
+        uploaded.ok_or_else(closed)
+    }
+
+    /// Renders one frame into the renderer's own images and waits for it.
+    ///
+    /// # Errors
+    /// The library's or the device's.
+    pub fn frame(&mut self, seed: [u32; 2]) -> Result<()> {
+        let renderer = self.renderer.as_mut().ok_or_else(closed)?;
+        let inputs = FrameInputs {
+            slot: 0,
+            view: self.view,
+            gbuffer: GBufferInput::Draws(&self.draws),
+            environment: self.environment,
+            seed,
+            output: None,
+        };
+        self.headless.submit(|cmd, _| {
+            // SAFETY: every submission is waited for, so slot 0 is always free; the buffers live as long as the session.
+            unsafe { renderer.record(cmd, &inputs) }?;
+            Ok(Retired::default())
+        })
+    }
+
+    /// GPU times of the frame before the last.
+    pub fn timings(&self) -> Option<&FrameTimings> {
+        self.renderer.as_ref().and_then(Renderer::timings)
+    }
+
+    /// Bytes declared by each pass of the last frame.
+    pub fn pass_bytes(&self) -> &[(&'static str, u64)] {
+        self.renderer.as_ref().map_or(&[], Renderer::pass_bytes)
+    }
+
+    /// Set-up times.
+    pub fn setup(&self) -> &[(&'static str, f64)] {
+        &self.setup
+    }
+
+    /// The device.
+    pub fn headless(&self) -> &Headless {
+        &self.headless
+    }
+
+    /// The number of samples that the last frame shaded.
+    ///
+    /// # Errors
+    /// The device's.
+    pub fn shaded(&mut self) -> Result<u32> {
+        let bytes = self.read(|renderer| Source::Buffer(renderer.arguments()))?;
+        Ok(bytemuck::pod_collect_to_vec::<u8, u32>(&bytes).get(3).copied().unwrap_or(0))
+    }
+
+    /// The texels of one of the renderer's own images after the last frame, in its own format and extent.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] for a name that the configuration has no image of.
+    pub fn image(&mut self, name: &str) -> Result<(Vec<u8>, vk::Format, [u32; 2])> {
+        let renderer = self.renderer.as_ref().ok_or_else(closed)?;
+        let image = renderer.image(name).ok_or_else(|| Error::argument("image", "one that the frame writes", name))?;
+        let (format, extent) = (image.desc.format, image.extent());
+        let name = image.desc.name;
+        let bytes = self.read(|renderer| renderer.image(name).map_or(Source::Nothing, Source::Image))?;
+        Ok((bytes, format, extent))
+    }
+
+    fn read(&mut self, source: impl Fn(&Renderer) -> Source<'_>) -> Result<Vec<u8>> {
+        let renderer = self.renderer.as_mut().ok_or_else(closed)?;
+        let mut target = None;
+        self.headless.submit(|cmd, memory| {
+            let size = source(renderer).bytes();
+            let usage = vk::BufferUsageFlags::TRANSFER_DST;
+            let buffer =
+                Build::run(renderer.context(), memory, |b| Buffer::new(b, "read-back", size, usage, Location::Readback))?;
+            renderer.copy_out(cmd, |r, rec| source(r).record(rec, &buffer));
+            target = Some(buffer);
+            Ok(Retired::default())
+        })?;
+        let buffer = target.ok_or_else(closed)?;
+        let bytes = buffer.bytes().to_vec();
+        let (host, memory) = self.headless.parts()?;
+        let mut bag = Retired::default();
+        buffer.retire(&mut bag);
+        // SAFETY: the submission was waited for.
+        unsafe { bag.free(host.device, memory) };
+        Ok(bytes)
+    }
+
+    /// Validation messages so far.
+    pub fn messages(&self) -> Vec<String> {
+        self.headless.messages()
+    }
+}
+
+impl Drop for Session {
+    fn drop(&mut self) {
+        let mut bag = self.renderer.take().map_or_else(Retired::default, Renderer::destroy);
+        for mesh in self.meshes.drain(..) {
+            for buffer in [mesh.positions, mesh.normals, mesh.coordinates, mesh.indices] {
+                buffer.retire(&mut bag);
+            }
+        }
+        if let Ok((host, memory)) = self.headless.parts() {
+            // SAFETY: every submission was waited for.
+            unsafe { bag.free(host.device, memory) };
+        }
+    }
+}
+
+/// What can be copied to the host.
+enum Source<'a> {
+    Nothing,
+    Image(&'a Image),
+    Buffer(&'a Buffer),
+}
+
+impl Source<'_> {
+    fn bytes(&self) -> u64 {
+        match self {
+            Self::Nothing => 0,
+            Self::Image(image) => image.desc.bytes(),
+            Self::Buffer(buffer) => buffer.size,
+        }
+    }
+
+    fn record(&self, rec: &mut Recorder<'_>, target: &Buffer) {
+        match self {
+            Self::Nothing => {}
+            Self::Image(image) => {
+                rec.image(image, Access::TRANSFER_READ);
+                rec.buffer(target, Access::TRANSFER_WRITE);
+                rec.flush();
+                let [width, height] = image.extent();
+                let layers =
+                    vk::ImageSubresourceLayers { aspect_mask: image.desc.aspect(), layer_count: 1, ..Default::default() };
+                let extent = vk::Extent3D { width, height, depth: 1 };
+                let region = vk::BufferImageCopy { image_subresource: layers, image_extent: extent, ..Default::default() };
+                // SAFETY: the command buffer is recording; the buffer holds the whole image.
+                unsafe {
+                    rec.cx.device.cmd_copy_image_to_buffer(
+                        rec.cmd,
+                        image.handle,
+                        Access::TRANSFER_READ.layout,
+                        target.handle,
+                        &[region],
+                    );
+                }
+            }
+            Self::Buffer(buffer) => {
+                rec.buffer(buffer, Access::TRANSFER_READ);
+                rec.buffer(target, Access::TRANSFER_WRITE);
+                rec.flush();
+                let region = vk::BufferCopy { size: buffer.size, ..Default::default() };
+                // SAFETY: as above.
+                unsafe { rec.cx.device.cmd_copy_buffer(rec.cmd, buffer.handle, target.handle, &[region]) };
+            }
+        }
+        rec.buffer(target, Access::HOST_READ);
+        rec.flush();
+        rec.forget(target.handle);
+    }
+}
+
+fn closed() -> Error {
+    Error::Device("the session is closed".into())
+}
+
+fn milliseconds(since: Instant) -> f64 {
+    since.elapsed().as_secs_f64() * 1e3
+}
+
+/// A near plane that nothing visible crosses unless the camera stands inside an object.
+fn near(world: &World) -> f64 {
+    let reach = world.objects.iter().map(|o| {
+        let centre = o.transform().w_axis.truncate();
+        centre.distance(world.camera.position)
+    });
+    (reach.fold(0.0, f64::max) * NEAR).max(1e-6)
+}
+
+/// The camera as matrices: reversed depth is not needed, as depth travels in the surface image at full precision.
+fn view(camera: &Camera, extent: [u32; 2], near: f64) -> View {
+    let basis = camera.world_from_view();
+    let world_from_view = DMat4::from_cols(
+        basis.x_axis.extend(0.0),
+        basis.y_axis.extend(0.0),
+        basis.z_axis.extend(0.0),
+        camera.position.extend(1.0),
+    );
+    let f = 1.0 / (camera.fov_y.to_radians() / 2.0).tan();
+    let aspect = f64::from(extent[0]) / f64::from(extent[1]);
+    // Infinite far plane; Vulkan's y points down.
+    let clip_from_view = DMat4::from_cols(
+        DVec4::new(f / aspect, 0.0, 0.0, 0.0),
+        DVec4::new(0.0, -f, 0.0, 0.0),
+        DVec4::new(0.0, 0.0, -1.0, -1.0),
+        DVec4::new(0.0, 0.0, -near, 0.0),
+    );
+    let columns = |m: DMat4| -> [f32; 16] { Mat4::to_cols_array(&m.as_mat4()) };
+    View { world_from_view: columns(world_from_view), clip_from_view: columns(clip_from_view) }
+}
