@@ -1,0 +1,237 @@
+//! Importance tables over the view angle: what is drawn has the density that is claimed, and estimates have the right mean.
+
+mod support {
+    pub mod statistics;
+}
+
+use glam::DVec3;
+use passband::reflectance::importance::{self, COLUMNS, ROWS, VIEW_ANGLES};
+use passband::reflectance::{Ggx, ImportanceTable, Reflectance, stand_in};
+use passband::sampling::{luminance, sobol};
+use std::f64::consts::{FRAC_PI_2, PI};
+use std::sync::LazyLock;
+use support::statistics::{Mean, chi_square_p};
+
+const P_VALUE: f64 = 1e-4;
+const DEGREES: [f64; 6] = [0.0, 20.0, 45.0, 70.0, 85.0, 89.0];
+
+type Case = (String, Box<dyn Reflectance>, ImportanceTable);
+
+static CASES: LazyLock<Vec<Case>> = LazyLock::new(|| {
+    let case = |name: String, f: Box<dyn Reflectance>| {
+        let start = std::time::Instant::now();
+        let table = ImportanceTable::build(f.as_ref());
+        println!("{name}: built in {:.3} s", start.elapsed().as_secs_f64());
+        (name, f, table)
+    };
+    let baked = stand_in::names().iter().map(|&n| case(n.into(), Box::new(stand_in::table(n).unwrap())));
+    let ggx = [0.01, 0.05, 0.2, 0.5]
+        .map(|alpha| case(format!("ggx {alpha}"), Box::new(Ggx { alpha, f0: DVec3::ONE, albedo: DVec3::ZERO })));
+    let diffuse = Ggx { alpha: 1.0, f0: DVec3::ZERO, albedo: DVec3::splat(0.8) };
+    baked.chain(ggx).chain([case("diffuse".into(), Box::new(diffuse)), case("black".into(), Box::new(Black))]).collect()
+});
+
+/// Reflects nothing.
+struct Black;
+impl Reflectance for Black {
+    fn evaluate(&self, _: DVec3, _: DVec3) -> DVec3 {
+        DVec3::ZERO
+    }
+}
+
+/// Says nonsense.
+struct Broken;
+impl Reflectance for Broken {
+    fn evaluate(&self, wi: DVec3, _: DVec3) -> DVec3 {
+        DVec3::splat(if wi.x > 0.0 { f64::NAN } else { f64::INFINITY })
+    }
+}
+
+fn viewer(degrees: f64) -> DVec3 {
+    let (sin, cos) = degrees.to_radians().sin_cos();
+    DVec3::new(sin, 0.0, cos)
+}
+
+/// Midpoint quadrature over half vectors above the plane, fine near the normal (theta = (pi/2) x^2).
+fn over_half_vectors(n: [usize; 2], mut f: impl FnMut(DVec3, f64)) {
+    for i in 0..n[0] {
+        let x = (i as f64 + 0.5) / n[0] as f64;
+        let theta = FRAC_PI_2 * x * x;
+        for j in 0..n[1] {
+            let phi = 2.0 * PI * (j as f64 + 0.5) / n[1] as f64;
+            let h = DVec3::new(theta.sin() * phi.cos(), theta.sin() * phi.sin(), theta.cos());
+            f(h, theta.sin() * PI * x / n[0] as f64 * 2.0 * PI / n[1] as f64);
+        }
+    }
+}
+
+fn reflect(wo: DVec3, h: DVec3) -> Option<(DVec3, f64)> {
+    let cosine = wo.dot(h);
+    let wi = 2.0 * cosine * h - wo;
+    (cosine > 0.0 && wi.z > 0.0).then_some((wi, cosine))
+}
+
+#[test]
+fn cells_partition_the_half_vectors_exactly() {
+    for (name, _, table) in CASES.iter().chain([&("broken".into(), Box::new(Broken) as _, ImportanceTable::build(&Broken))]) {
+        assert_eq!(table.cells().len(), VIEW_ANGLES * ROWS * COLUMNS);
+        assert!(table.density_texels().iter().all(|d| (1e-4..=6e4).contains(d)), "{name}");
+        for node in table.cells().chunks(ROWS * COLUMNS) {
+            let mut t = 0.0f32;
+            for row in node.chunks(COLUMNS) {
+                let mut phi = 0.0f32;
+                for &[t0, t1, phi0, phi1] in row {
+                    assert!(t0 == t && t1 == row[0][1] && phi0 == phi, "{name}: {:?} does not join", [t0, t1, phi0, phi1]);
+                    assert!(t1 > t0 && phi1 > phi0, "{name}: {:?} is empty", [t0, t1, phi0, phi1]);
+                    phi = phi1;
+                }
+                assert_eq!(phi, std::f32::consts::PI, "{name}");
+                t = row[0][1];
+            }
+            assert_eq!(t, 1.0, "{name}");
+        }
+    }
+}
+
+#[test]
+fn half_vectors_have_the_cells_density() {
+    const N: u32 = 1 << 18;
+    // Bins that know nothing of the cells: even in sqrt(theta) and azimuth. Both are boxes in (t, phi), so that the
+    // expectation is exact.
+    const BINS: [usize; 2] = [30, 11];
+    let t_border = |i: usize| 1.0 - (FRAC_PI_2 * (i as f64 / BINS[0] as f64).powi(2)).cos();
+    let phi_border = |i: usize| PI * i as f64 / BINS[1] as f64;
+    let share = |a: f32, b: f32, low: f64, high: f64| {
+        let (a, b) = (f64::from(a), f64::from(b));
+        (b.min(high) - a.max(low)).max(0.0) / (b - a)
+    };
+    for (name, _, table) in CASES.iter() {
+        for degrees in DEGREES {
+            let cos_o = viewer(degrees).z;
+            let mut expected = vec![0.0; 2 * BINS[0] * BINS[1]];
+            for &[t0, t1, phi0, phi1] in table.cells().chunks(ROWS * COLUMNS).nth(importance::node(cos_o)).unwrap() {
+                for row in 0..BINS[0] {
+                    let along_t = share(t0, t1, t_border(row), t_border(row + 1));
+                    for column in 0..BINS[1] {
+                        let mass = along_t * share(phi0, phi1, phi_border(column), phi_border(column + 1));
+                        let at = (row * BINS[1] + column) * 2;
+                        (0..2).for_each(|sign| expected[at + sign] += mass * f64::from(N) / (2 * ROWS * COLUMNS) as f64);
+                    }
+                }
+            }
+            assert!((expected.iter().sum::<f64>() / f64::from(N) - 1.0).abs() < 1e-6, "{name} at {degrees}");
+
+            let mut observed = vec![0; expected.len()];
+            let mut disagree = 0;
+            for i in 0..N {
+                let (h, pdf) = table.half_vector(cos_o, sobol::random(i, 41).map(sobol::to_unit));
+                assert!(pdf.is_finite() && pdf > 0.0, "{name} at {degrees}: {h} has density {pdf}");
+                disagree += u32::from((table.pdf_half(cos_o, h) / pdf - 1.0).abs() > 1e-9);
+                let x = (h.x.hypot(h.y).atan2(h.z) / FRAC_PI_2).sqrt();
+                let at = |x: f64, n: usize| ((x * n as f64) as usize).min(n - 1);
+                let bin = at(x, BINS[0]) * BINS[1] + at(h.y.abs().atan2(h.x) / PI, BINS[1]);
+                observed[bin * 2 + usize::from(h.y < 0.0)] += 1;
+            }
+            let p = chi_square_p(&observed, &expected);
+            assert!(p > P_VALUE, "{name} at {degrees}: p = {p}");
+            // Rounding may put a half vector on a border into the next cell.
+            assert!(disagree < 20, "{name} at {degrees}: half_vector and pdf_half disagree {disagree} times");
+        }
+    }
+}
+
+#[test]
+fn light_directions_have_the_density_that_is_returned() {
+    const N: u32 = 1 << 18;
+    // Over the light's hemisphere, even in the roots of z and of the azimuth from the mirror direction, where grazing light
+    // crowds; and a last bin for rejected samples. The expectation integrates `pdf` over directions.
+    const BINS: [usize; 2] = [16, 24];
+    const FINE: [usize; 2] = [120, 40];
+    for (name, _, table) in CASES.iter().filter(|c| ["rough", "metallic-paint", "ggx 0.2", "diffuse"].contains(&c.0.as_str())) {
+        for degrees in [20.0, 70.0, 89.0] {
+            let cos_o = viewer(degrees).z;
+            let bins = BINS[0] * BINS[1];
+            let mut expected = vec![0.0; bins + 1];
+            let fine = [BINS[0] * FINE[0], BINS[1] * FINE[1]];
+            for i in 0..fine[0] {
+                let root = (i as f64 + 0.5) / fine[0] as f64;
+                let (z, dz) = (root * root, 2.0 * root / fine[0] as f64);
+                let sine = (1.0 - z * z).sqrt();
+                for j in 0..fine[1] {
+                    let root = 2.0 * (j as f64 + 0.5) / fine[1] as f64 - 1.0;
+                    let (phi, dphi) = (PI * root * root.abs(), 4.0 * PI * root.abs() / fine[1] as f64);
+                    let pdf = table.pdf(cos_o, DVec3::new(-sine * phi.cos(), -sine * phi.sin(), z));
+                    expected[i / FINE[0] * BINS[1] + j / FINE[1]] += pdf * dz * dphi * f64::from(N);
+                }
+            }
+            let mut rejected = 0.0;
+            over_half_vectors([1000, 500], |h, solid_angle| {
+                if reflect(viewer(degrees), h).is_none() {
+                    rejected += table.pdf_half(cos_o, h) * solid_angle;
+                }
+            });
+            expected[bins] = rejected * f64::from(N);
+            let total = expected.iter().sum::<f64>() / f64::from(N);
+            assert!((total - 1.0).abs() < 2e-3, "{name} at {degrees}: pdf and rejected mass sum to {total}");
+
+            let mut observed = vec![0; bins + 1];
+            for i in 0..N {
+                let Some(s) = table.sample(cos_o, sobol::random(i, 43).map(sobol::to_unit)) else {
+                    observed[bins] += 1;
+                    continue;
+                };
+                assert!((s.wi.length() - 1.0).abs() < 1e-12 && s.wi.z > 0.0 && s.pdf > 0.0);
+                let phi = (-s.wi.y).atan2(-s.wi.x) / PI;
+                let y = (1.0 + phi.signum() * phi.abs().sqrt()) / 2.0;
+                let at = |x: f64, n: usize| ((x * n as f64) as usize).min(n - 1);
+                observed[at(s.wi.z.sqrt(), BINS[0]) * BINS[1] + at(y, BINS[1])] += 1;
+            }
+            let p = chi_square_p(&observed, &expected);
+            println!("{name} at {degrees}: p = {p:.3}, rejected {rejected:.4}, sum {total:.5}");
+            assert!(p > P_VALUE, "{name} at {degrees}: p = {p}");
+        }
+    }
+}
+
+#[test]
+fn estimates_have_the_mean_that_quadrature_finds() {
+    for (name, f, table) in CASES.iter() {
+        for degrees in DEGREES {
+            let wo = viewer(degrees);
+            let mut truth = 0.0;
+            over_half_vectors([1500, 400], |h, solid_angle| {
+                if let Some((wi, cosine)) = reflect(wo, h) {
+                    truth += luminance(f.evaluate(wi, wo)) * wi.z * 4.0 * cosine * solid_angle;
+                }
+            });
+            let mut estimate = Mean::default();
+            for i in 0..1 << 18 {
+                let s = table.sample(wo.z, sobol::random(i, 47).map(sobol::to_unit));
+                estimate.add(s.map_or(0.0, |s| luminance(f.evaluate(s.wi, wo)) * s.wi.z / s.pdf));
+            }
+            let off = estimate.mean() - truth;
+            let deviation = estimate.deviation() / truth.max(1e-9);
+            println!("{name} at {degrees}: {:.5} for {truth:.5}, relative deviation {deviation:.3}", estimate.mean());
+            assert!(off.abs() <= 4.5 * estimate.error() + 3e-4 * truth, "{name} at {degrees}: {} for {truth}", estimate.mean());
+        }
+    }
+}
+
+#[test]
+fn the_smooth_density_follows_the_cells() {
+    // Not equal by design; its integral shows that it is the same distribution, at the resolution of its bins.
+    for (name, _, table) in CASES.iter() {
+        for degrees in DEGREES {
+            let cos_o = viewer(degrees).z;
+            let mut total = 0.0;
+            let mut shared = 0.0;
+            over_half_vectors([1500, 400], |h, solid_angle| {
+                let density = table.density(cos_o, h);
+                total += density * solid_angle;
+                shared += density.min(table.pdf_half(cos_o, h)) * solid_angle;
+            });
+            println!("{name} at {degrees}: integral {total:.3}, shared with the cells {shared:.3}");
+            assert!((total - 1.0).abs() < 0.05 && shared > 0.85, "{name} at {degrees}: integral {total}, shared {shared}");
+        }
+    }
+}
