@@ -164,12 +164,22 @@ fn environment_estimates_are_unbiased() {
 }
 
 #[test]
-fn environment_density_has_mean_one() {
+fn environment_density_is_the_floored_luminance_times_the_sine() {
     for (name, map) in maps() {
         let importance = EnvironmentImportance::build(&map).unwrap();
         let texels = importance.density_texels();
         assert_eq!(texels.len(), importance.alias().entries().len());
-        let mean = texels.iter().map(|&x| f64::from(x)).sum::<f64>() / texels.len() as f64;
-        assert!((mean - 1.0).abs() < 1e-6 && texels.iter().all(|&x| x > 0.0), "{name}: {mean}");
+        let luminance: Vec<f64> =
+            map.texels().iter().map(|t| 0.2126 * f64::from(t[0]) + 0.7152 * f64::from(t[1]) + 0.0722 * f64::from(t[2])).collect();
+        let floor = luminance.iter().sum::<f64>() / luminance.len() as f64 * 1e-3;
+        let row = |i: usize| (i as u32 / map.width()) as f64;
+        let weight = |i: usize| match name {
+            "black" => (PI * (row(i) + 0.5) / f64::from(map.height())).sin(),
+            _ => luminance[i].max(floor) * (PI * (row(i) + 0.5) / f64::from(map.height())).sin(),
+        };
+        let mean = (0..texels.len()).map(weight).sum::<f64>() / texels.len() as f64;
+        for (i, &texel) in texels.iter().enumerate() {
+            assert!((f64::from(texel) / (weight(i) / mean) - 1.0).abs() < 1e-6, "{name}, texel {i}: {texel}");
+        }
     }
 }

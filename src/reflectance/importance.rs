@@ -26,8 +26,9 @@ const FINE_ROWS: usize = 512;
 const FINE_COLUMNS: usize = 64;
 /// Share of the density that follows the reflectance; the rest follows the cosine, for what the table does not foresee.
 const REFLECTANCE_SHARE: f64 = 0.9;
-/// Uniform density added everywhere, so that no cell is empty.
-const FLOOR: f64 = 1e-4;
+/// Uniform density added everywhere, so that no cell is empty. It amounts to one row: with less, the last row would stretch
+/// over all that is below the horizon and take part of the lobe with it (measured: up to twice the deviation of broad lobes).
+const FLOOR: f64 = 1.0 / (2.0 * PI * ROWS as f64);
 /// The view cosine that stands for the horizon, where there is nothing to reflect.
 const GRAZING: f64 = 2e-3;
 /// The smooth density's range: normal numbers in 16-bit floating point.
@@ -69,13 +70,13 @@ impl ImportanceTable {
         table
     }
 
-    /// The cells `(t0, t1, phi0, phi1)`, [node][row][column]: neighbours share borders bit for bit, rows fill [0, 1] and
+    /// The cells `(t0, t1, phi0, phi1)`, `[node][row][column]`: neighbours share borders bit for bit, rows fill [0, 1] and
     /// columns fill [0, pi] (pi as `f32`), none is empty.
     pub fn cells(&self) -> &[[f32; 4]] {
         &self.cells
     }
 
-    /// The smooth density, [node][row][column]; see [`Self::density`].
+    /// The smooth density, `[node][row][column]`; see [`Self::density`].
     pub fn density_texels(&self) -> &[f32] {
         &self.density
     }
@@ -197,8 +198,8 @@ impl FineGrid {
         (self.t[row + 1] - self.t[row]) * PI / FINE_COLUMNS as f64
     }
 
-    /// The density of half vectors to aim for, per steradian: the reflected luminance, and a cosine lobe. Both are
-    /// densities of the light's direction times 4 (o.h), which takes them to half vectors (Walter et al. 2007, equation 14).
+    /// The density of half vectors to aim for, per steradian: the reflected luminance, a cosine lobe and the floor. The first
+    /// two are densities of the light's direction times 4 (o.h), which takes them to half vectors (Walter et al. 2007, equation 14).
     fn target(&self, reflectance: &dyn Reflectance, cos_o: f64) -> Vec<f64> {
         let wo = viewer(cos_o);
         let light = |h: DVec3| {
@@ -212,10 +213,18 @@ impl FineGrid {
             .map(|&h| light(h).map_or(0.0, |(wi, jacobian)| luminance(reflectance.evaluate(wi, wo)) * jacobian))
             .collect();
         reflected.iter_mut().filter(|f| !(f.is_finite() && **f > 0.0)).for_each(|f| *f = 0.0);
-        let integral: f64 = reflected.iter().enumerate().map(|(i, f)| 2.0 * f * self.solid_angle(i / FINE_COLUMNS)).sum();
+        let integral = self.integral(&reflected);
         let scale = if integral.is_normal() { REFLECTANCE_SHARE / integral } else { 0.0 };
         let defensive = |h| light(h).map_or(0.0, |(_, jacobian)| (1.0 - REFLECTANCE_SHARE) / PI * jacobian);
-        reflected.iter().zip(&self.h).map(|(f, &h)| f * scale + defensive(h) + FLOOR).collect()
+        let mut target: Vec<f64> = reflected.iter().zip(&self.h).map(|(f, &h)| f * scale + defensive(h) + FLOOR).collect();
+        let integral = self.integral(&target);
+        target.iter_mut().for_each(|f| *f /= integral);
+        target
+    }
+
+    /// The integral over both signs of the azimuth.
+    fn integral(&self, values: &[f64]) -> f64 {
+        values.iter().enumerate().map(|(i, f)| 2.0 * f * self.solid_angle(i / FINE_COLUMNS)).sum()
     }
 
     /// Appends one node's cells: strips of equal mass in t, each cut into intervals of equal mass in the azimuth.

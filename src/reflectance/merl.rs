@@ -35,7 +35,7 @@ pub struct MerlError {
 /// An isotropic table of 90 x 90 x 180 reflectances (theta_half, theta_diff, phi_diff), in 1/sr.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MerlTable {
-    /// Rec.709 values at bin centres, [theta_half][theta_diff][phi_diff]; finite and not negative.
+    /// Rec.709 values at bin centres, `[theta_half][theta_diff][phi_diff]`; finite and not negative.
     values: Vec<[f32; 3]>,
 }
 
@@ -115,7 +115,7 @@ impl MerlTable {
         Ok(())
     }
 
-    /// The table for the GPU: a factor and one `E5B9G9R9_UFLOAT_PACK32` per entry, [theta_half][theta_diff][phi_diff]; an
+    /// The table for the GPU: a factor and one `E5B9G9R9_UFLOAT_PACK32` per entry, `[theta_half][theta_diff][phi_diff]`; an
     /// entry's value is the factor times what [`packing::decode`] returns. The factor is 1 unless an entry is above
     /// [`packing::MAX`], then the least power of two that brings all below.
     pub fn packed(&self) -> (f32, Vec<u32>) {

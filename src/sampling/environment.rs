@@ -21,7 +21,7 @@ pub struct EnvironmentImportance {
 }
 
 impl EnvironmentImportance {
-    /// Weighs each texel by its luminance, at least [`FLOOR`] of the mean, times the sine of its row's polar angle.
+    /// Weighs each texel by its luminance, at least a thousandth of the mean, times the sine of its row's polar angle.
     ///
     /// # Errors
     /// [`crate::Error::InvalidInput`] if the map has more texels than a 32-bit index reaches.
