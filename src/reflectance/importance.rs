@@ -1,1 +1,272 @@
-//! (to come)
+//! Vectors of importance samples, precomputed over the view angle (Bagher et al. 2011, section 3.3), here as a grid of cells
+//! of equal probability over the half vector. Twin of `glsl/include/reflectance/importance.glsl`.
+//!
+//! Local frame: z is the normal and the viewer is in the xz-plane, `wo = (sin, 0, cos)`. A half vector h is known by
+//! `t = 1 - cos(theta_h)` in [0, 1] and its azimuth in [-pi, pi], in which solid angle is `dt dphi`; reflectance is
+//! isotropic, so the azimuth's sign is a coin toss and the tables cover [0, pi].
+
+use crate::reflectance::{Reflectance, clamped};
+use crate::sampling::luminance;
+use glam::DVec3;
+use std::f64::consts::{FRAC_PI_2, PI};
+
+/// View angles that have a table: node `i` covers `[i, i + 1] * 90 / 64` degrees.
+pub const VIEW_ANGLES: usize = 64;
+/// Strips of equal probability in t.
+pub const ROWS: usize = 64;
+/// Cells of equal probability in the azimuth, per strip.
+pub const COLUMNS: usize = 16;
+/// Rows of the smooth density, at bin centres of `sqrt(theta_h / (pi/2))`.
+pub const DENSITY_ROWS: usize = 64;
+/// Columns of the smooth density, at bin centres of `(1 - cos(phi_h)) / 2`.
+pub const DENSITY_COLUMNS: usize = 16;
+
+/// The grid on which a target is tabulated: rows uniform in `sqrt(theta_h / (pi/2))`, so that a lobe of alpha 0.01 spans 40.
+const FINE_ROWS: usize = 512;
+const FINE_COLUMNS: usize = 64;
+/// Share of the density that follows the reflectance; the rest follows the cosine, for what the table does not foresee.
+const REFLECTANCE_SHARE: f64 = 0.9;
+/// Uniform density added everywhere, so that no cell is empty.
+const FLOOR: f64 = 1e-4;
+/// The view cosine that stands for the horizon, where there is nothing to reflect.
+const GRAZING: f64 = 2e-3;
+/// The smooth density's range: normal numbers in 16-bit floating point.
+const DENSITY_RANGE: (f64, f64) = (1e-4, 6e4);
+
+/// The importance tables of one reflectance.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ImportanceTable {
+    cells: Vec<[f32; 4]>,
+    density: Vec<f32>,
+}
+
+/// A direction drawn from an [`ImportanceTable`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ImportanceSample {
+    /// To the light (unit, above the horizon).
+    pub wi: DVec3,
+    /// The half vector.
+    pub h: DVec3,
+    /// Density of `wi` per steradian.
+    pub pdf: f64,
+}
+
+impl ImportanceTable {
+    /// Tabulates `reflectance`. Each node's target is the average of those at both ends of its range of view angles, so that
+    /// directions which are above the horizon for some pixel of the node are never left to the floor.
+    pub fn build(reflectance: &dyn Reflectance) -> Self {
+        let mut table = Self { cells: Vec::new(), density: Vec::new() };
+        let grid = FineGrid::new();
+        let mut before = grid.target(reflectance, 1.0);
+        for node in 0..VIEW_ANGLES {
+            let theta = FRAC_PI_2 * (node + 1) as f64 / VIEW_ANGLES as f64;
+            let after = grid.target(reflectance, theta.cos().max(GRAZING));
+            let target: Vec<f64> = before.iter().zip(&after).map(|(a, b)| (a + b) / 2.0).collect();
+            grid.cut(&target, &mut table.cells);
+            grid.resample(&target, &mut table.density);
+            before = after;
+        }
+        table
+    }
+
+    /// The cells `(t0, t1, phi0, phi1)`, [node][row][column]: neighbours share borders bit for bit, rows fill [0, 1] and
+    /// columns fill [0, pi] (pi as `f32`), none is empty.
+    pub fn cells(&self) -> &[[f32; 4]] {
+        &self.cells
+    }
+
+    /// The smooth density, [node][row][column]; see [`Self::density`].
+    pub fn density_texels(&self) -> &[f32] {
+        &self.density
+    }
+
+    /// Draws a half vector for the view cosine `cos_o` from two numbers in [0, 1), with its density per steradian.
+    pub fn half_vector(&self, cos_o: f64, u: [f64; 2]) -> (DVec3, f64) {
+        let (row, along_t) = split(u[0], ROWS);
+        let (sign, v) = if u[1] < 0.5 { (1.0, 2.0 * u[1]) } else { (-1.0, 2.0 * u[1] - 1.0) };
+        let (column, along_phi) = split(v, COLUMNS);
+        let cell = self.cell(node(cos_o), row, column);
+        let [t0, t1, phi0, phi1] = cell.map(f64::from);
+        let (t, phi) = (t0 + (t1 - t0) * along_t, sign * (phi0 + (phi1 - phi0) * along_phi));
+        let sine = (t * (2.0 - t)).sqrt();
+        (DVec3::new(sine * phi.cos(), sine * phi.sin(), 1.0 - t), cell_density(cell))
+    }
+
+    /// Draws a light direction for the view cosine `cos_o` from two numbers in [0, 1). `None` is a rejected sample, below
+    /// the horizon or seen from behind: it counts as zero in an estimate, not as not drawn.
+    pub fn sample(&self, cos_o: f64, u: [f64; 2]) -> Option<ImportanceSample> {
+        let (h, pdf_h) = self.half_vector(cos_o, u);
+        let wo = viewer(cos_o);
+        let cosine = wo.dot(h);
+        let wi = 2.0 * cosine * h - wo;
+        (cosine > 0.0 && wi.z > 0.0).then(|| ImportanceSample { wi, h, pdf: pdf_h / (4.0 * cosine) })
+    }
+
+    /// The exact density per steradian with which [`Self::half_vector`] draws unit `h`; 0 below the horizon.
+    pub fn pdf_half(&self, cos_o: f64, h: DVec3) -> f64 {
+        if h.z < 0.0 {
+            return 0.0;
+        }
+        let sine = h.x * h.x + h.y * h.y;
+        let (t, phi) = ((sine / (1.0 + h.z)) as f32, h.y.abs().atan2(h.x) as f32);
+        let node = node(cos_o);
+        let row = (0..ROWS).find(|&r| t < self.cell(node, r, 0)[1]).unwrap_or(ROWS - 1);
+        let column = (0..COLUMNS).find(|&c| phi < self.cell(node, row, c)[3]).unwrap_or(COLUMNS - 1);
+        cell_density(self.cell(node, row, column))
+    }
+
+    /// The exact density per steradian with which [`Self::sample`] draws unit `wi`; 0 below the horizon.
+    pub fn pdf(&self, cos_o: f64, wi: DVec3) -> f64 {
+        let wo = viewer(cos_o);
+        let h = (wi + wo).normalize_or_zero();
+        let cosine = wo.dot(h);
+        if wi.z > 0.0 && cosine > 0.0 { self.pdf_half(cos_o, h) / (4.0 * cosine) } else { 0.0 }
+    }
+
+    /// A smooth stand-in for the density of `h` per steradian, bilinear in its table: **for the weights of multiple
+    /// importance sampling only**, where any positive function that depends on the direction alone is right, and a smooth
+    /// one is cheaper to look up and no noisier than the cells' exact density.
+    pub fn density(&self, cos_o: f64, h: DVec3) -> f64 {
+        let sine = h.x.hypot(h.y);
+        let cos_phi = if sine > 0.0 { h.x / sine } else { 1.0 };
+        let (r0, r1, r) = clamped((sine.atan2(h.z) / FRAC_PI_2).sqrt(), DENSITY_ROWS);
+        let (c0, c1, c) = clamped((1.0 - cos_phi) / 2.0, DENSITY_COLUMNS);
+        let node = node(cos_o);
+        let at = |r, c| f64::from(self.density[(node * DENSITY_ROWS + r) * DENSITY_COLUMNS + c]);
+        let row = |r| at(r, c0) + (at(r, c1) - at(r, c0)) * c;
+        row(r0) + (row(r1) - row(r0)) * r
+    }
+
+    fn cell(&self, node: usize, row: usize, column: usize) -> [f32; 4] {
+        self.cells[(node * ROWS + row) * COLUMNS + column]
+    }
+}
+
+/// The node whose table a view cosine uses.
+pub fn node(cos_o: f64) -> usize {
+    ((cos_o.clamp(0.0, 1.0).acos() / FRAC_PI_2 * VIEW_ANGLES as f64) as usize).min(VIEW_ANGLES - 1)
+}
+
+/// The viewer's direction in the local frame.
+fn viewer(cos_o: f64) -> DVec3 {
+    DVec3::new((1.0 - cos_o * cos_o).max(0.0).sqrt(), 0.0, cos_o)
+}
+
+/// Density per steradian in a cell: each has the same probability, half of it at either sign of the azimuth.
+fn cell_density(cell: [f32; 4]) -> f64 {
+    let [t0, t1, phi0, phi1] = cell.map(f64::from);
+    1.0 / ((2 * ROWS * COLUMNS) as f64 * (t1 - t0) * (phi1 - phi0))
+}
+
+/// Which of `parts` equal parts of [0, 1) holds `u`, and where in it.
+fn split(u: f64, parts: usize) -> (usize, f64) {
+    let x = u * parts as f64;
+    let part = (x as usize).min(parts - 1);
+    (part, x - part as f64)
+}
+
+/// The half vectors at which a target is evaluated: piecewise constant over [row][column].
+struct FineGrid {
+    /// Borders of the rows in t.
+    t: Vec<f64>,
+    /// Borders of the columns in the azimuth.
+    phi: Vec<f64>,
+    /// Unit half vectors at the centres.
+    h: Vec<DVec3>,
+}
+
+impl FineGrid {
+    fn new() -> Self {
+        // 1 - cos(theta) without cancellation near the normal.
+        let t = |row: f64| 2.0 * (FRAC_PI_2 * (row / FINE_ROWS as f64).powi(2) / 2.0).sin().powi(2);
+        let phi = |column: f64| PI * column / FINE_COLUMNS as f64;
+        let centre = |i: usize| {
+            let (t, phi) = (t((i / FINE_COLUMNS) as f64 + 0.5), phi((i % FINE_COLUMNS) as f64 + 0.5));
+            let sine = (t * (2.0 - t)).sqrt();
+            DVec3::new(sine * phi.cos(), sine * phi.sin(), 1.0 - t)
+        };
+        Self {
+            t: (0..=FINE_ROWS).map(|row| if row == FINE_ROWS { 1.0 } else { t(row as f64) }).collect(),
+            phi: (0..=FINE_COLUMNS).map(|column| phi(column as f64)).collect(),
+            h: (0..FINE_ROWS * FINE_COLUMNS).map(centre).collect(),
+        }
+    }
+
+    /// Solid angle of a fine cell of `row`, at one sign of the azimuth.
+    fn solid_angle(&self, row: usize) -> f64 {
+        (self.t[row + 1] - self.t[row]) * PI / FINE_COLUMNS as f64
+    }
+
+    /// The density of half vectors to aim for, per steradian: the reflected luminance, and a cosine lobe. Both are
+    /// densities of the light's direction times 4 (o.h), which takes them to half vectors (Walter et al. 2007, equation 14).
+    fn target(&self, reflectance: &dyn Reflectance, cos_o: f64) -> Vec<f64> {
+        let wo = viewer(cos_o);
+        let light = |h: DVec3| {
+            let cosine = wo.dot(h);
+            let wi = 2.0 * cosine * h - wo;
+            (cosine > 0.0 && wi.z > 0.0).then_some((wi, 4.0 * cosine * wi.z))
+        };
+        let mut reflected: Vec<f64> = self
+            .h
+            .iter()
+            .map(|&h| light(h).map_or(0.0, |(wi, jacobian)| luminance(reflectance.evaluate(wi, wo)) * jacobian))
+            .collect();
+        reflected.iter_mut().filter(|f| !(f.is_finite() && **f > 0.0)).for_each(|f| *f = 0.0);
+        let integral: f64 = reflected.iter().enumerate().map(|(i, f)| 2.0 * f * self.solid_angle(i / FINE_COLUMNS)).sum();
+        let scale = if integral.is_normal() { REFLECTANCE_SHARE / integral } else { 0.0 };
+        let defensive = |h| light(h).map_or(0.0, |(_, jacobian)| (1.0 - REFLECTANCE_SHARE) / PI * jacobian);
+        reflected.iter().zip(&self.h).map(|(f, &h)| f * scale + defensive(h) + FLOOR).collect()
+    }
+
+    /// Appends one node's cells: strips of equal mass in t, each cut into intervals of equal mass in the azimuth.
+    fn cut(&self, target: &[f64], cells: &mut Vec<[f32; 4]>) {
+        let (fine_rows, _) = target.as_chunks::<FINE_COLUMNS>();
+        let mass: Vec<f64> = fine_rows.iter().enumerate().map(|(r, f)| f.iter().sum::<f64>() * self.solid_angle(r)).collect();
+        for t in quantiles::<ROWS>(&self.t, &mass).windows(2) {
+            let mut strip = [0.0; FINE_COLUMNS];
+            for (row, f) in fine_rows.iter().enumerate() {
+                let overlap = self.t[row + 1].min(t[1].into()) - self.t[row].max(t[0].into());
+                if overlap > 0.0 {
+                    strip.iter_mut().zip(f).for_each(|(sum, f)| *sum += f * overlap);
+                }
+            }
+            cells.extend(quantiles::<COLUMNS>(&self.phi, &strip).windows(2).map(|phi| [t[0], t[1], phi[0], phi[1]]));
+        }
+    }
+
+    /// Appends one node's smooth density: the target at the centres of the coarser bins.
+    fn resample(&self, target: &[f64], density: &mut Vec<f32>) {
+        for row in 0..DENSITY_ROWS {
+            let fine_row = (row as f64 + 0.5) / DENSITY_ROWS as f64;
+            for column in 0..DENSITY_COLUMNS {
+                let cos_phi = 1.0 - 2.0 * (column as f64 + 0.5) / DENSITY_COLUMNS as f64;
+                let (r0, r1, r) = clamped(fine_row, FINE_ROWS);
+                let (c0, c1, c) = clamped(cos_phi.acos() / PI, FINE_COLUMNS);
+                let along = |r: usize| {
+                    let (a, b) = (target[r * FINE_COLUMNS + c0], target[r * FINE_COLUMNS + c1]);
+                    a + (b - a) * c
+                };
+                let value = along(r0) + (along(r1) - along(r0)) * r;
+                density.push(value.clamp(DENSITY_RANGE.0, DENSITY_RANGE.1) as f32);
+            }
+        }
+    }
+}
+
+/// The `N + 1` borders that cut positive masses, spread evenly between their `borders`, into `N` equal parts.
+/// They increase strictly: a part is never narrower than an `N`-th of a fine interval, which `f32` resolves on both grids.
+fn quantiles<const N: usize>(borders: &[f64], mass: &[f64]) -> Vec<f32> {
+    let total: f64 = mass.iter().sum();
+    let mut cuts = Vec::with_capacity(N + 1);
+    cuts.extend(borders.first().map(|&first| first as f32));
+    let mut below = 0.0;
+    for (interval, mass) in borders.windows(2).zip(mass) {
+        while cuts.len() < N && below + mass >= total * cuts.len() as f64 / N as f64 {
+            let within = ((total * cuts.len() as f64 / N as f64 - below) / mass).clamp(0.0, 1.0);
+            cuts.push((interval[0] + (interval[1] - interval[0]) * within) as f32);
+        }
+        below += mass;
+    }
+    cuts.extend(borders.last().map(|&last| last as f32));
+    cuts
+}

@@ -1,12 +1,201 @@
-//! MERL tables.
-use crate::reflectance::Reflectance;
-use glam::DVec3;
+//! Measured isotropic reflectance on the grid of the MERL database (Matusik et al. 2003, "A Data-Driven Reflectance Model"):
+//! the half vector's polar angle, finer towards the peak, by the light's polar and azimuth angle about the half vector
+//! (Rusinkiewicz 1998). Twin of `glsl/include/reflectance/merl.glsl`.
 
-/// An isotropic table of 90 x 90 x 180 reflectances (theta_half, theta_diff, phi_diff).
-#[derive(Clone, Debug)]
-pub struct MerlTable {}
-impl Reflectance for MerlTable {
-    fn evaluate(&self, _wi: DVec3, _wo: DVec3) -> DVec3 {
-        DVec3::ZERO
+use crate::reflectance::{Reflectance, clamped, packing};
+use glam::{DVec2, DVec3};
+use std::f64::consts::{FRAC_PI_2, PI};
+
+/// Bins of theta_half over 0..pi/2, uniform in its square root.
+pub const THETA_HALF: usize = 90;
+/// Bins of theta_diff over 0..pi/2.
+pub const THETA_DIFF: usize = 90;
+/// Bins of phi_diff over 0..pi; the other half of the circle is its mirror by reciprocity.
+pub const PHI_DIFF: usize = 180;
+
+const ENTRIES: usize = THETA_HALF * THETA_DIFF * PHI_DIFF;
+const HEADER_BYTES: usize = 12;
+/// 1/sr over the stored number, per channel.
+const SCALE: [f64; 3] = [1.0 / 1500.0, 1.15 / 1500.0, 1.66 / 1500.0];
+
+/// What is wrong with a MERL `.binary` file.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{field} at byte {offset}: expected {expected}, got {got}")]
+pub struct MerlError {
+    /// The part of the file: `dimensions`, `size` or a channel's entry.
+    pub field: String,
+    /// Where it begins, in bytes from the start.
+    pub offset: u64,
+    /// What would be right.
+    pub expected: String,
+    /// What was found.
+    pub got: String,
+}
+
+/// An isotropic table of 90 x 90 x 180 reflectances (theta_half, theta_diff, phi_diff), in 1/sr.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MerlTable {
+    /// Rec.709 values at bin centres, [theta_half][theta_diff][phi_diff]; finite and not negative.
+    values: Vec<[f32; 3]>,
+}
+
+impl MerlTable {
+    /// Tabulates `f(theta_half, theta_diff, phi_diff)` (radians to 1/sr) at the bin centres. Values that are negative or not
+    /// finite as `f32` become 0, the table's word for "no measurement". `f` is also asked for angles that put one direction
+    /// below the horizon: what it says there is interpolated into the last bins above it.
+    pub fn from_fn(mut f: impl FnMut(f64, f64, f64) -> DVec3) -> Self {
+        let mut values = Vec::with_capacity(ENTRIES);
+        for i in 0..THETA_HALF {
+            let theta_half = FRAC_PI_2 * ((i as f64 + 0.5) / THETA_HALF as f64).powi(2);
+            for j in 0..THETA_DIFF {
+                let theta_diff = FRAC_PI_2 * (j as f64 + 0.5) / THETA_DIFF as f64;
+                for k in 0..PHI_DIFF {
+                    let rgb = f(theta_half, theta_diff, PI * (k as f64 + 0.5) / PHI_DIFF as f64);
+                    values.push(rgb.to_array().map(|c| stored(c).unwrap_or(0.0)));
+                }
+            }
+        }
+        Self { values }
     }
+
+    /// Reads a `.binary` file: three little-endian `i32` (90, 90, 180), then a plane of `f64` per channel, which the
+    /// database's factors (1, 1.15, 1.66) / 1500 bring to 1/sr. Negative entries mark missing measurements and read as 0.
+    ///
+    /// # Errors
+    /// [`MerlError`] for other dimensions, a file that is too short or too long, or an entry that is not finite as `f32`.
+    pub fn from_bytes(bytes: &[u8]) -> Result<Self, MerlError> {
+        let error = |field: &str, offset: usize, expected: String, got: String| MerlError {
+            field: field.into(),
+            offset: offset as u64,
+            expected,
+            got,
+        };
+        let size = HEADER_BYTES + 3 * ENTRIES * size_of::<f64>();
+        let expected_size = || format!("{size} bytes");
+        let Some((header, planes)) = bytes.split_at_checked(HEADER_BYTES) else {
+            return Err(error("size", bytes.len(), expected_size(), format!("{} bytes", bytes.len())));
+        };
+        let dimensions: Vec<_> = header.as_chunks().0.iter().map(|&d| i32::from_le_bytes(d)).collect();
+        if dimensions != [THETA_HALF as i32, THETA_DIFF as i32, PHI_DIFF as i32] {
+            let expected = format!("{THETA_HALF} {THETA_DIFF} {PHI_DIFF}");
+            let got = dimensions.iter().map(i32::to_string).collect::<Vec<_>>().join(" ");
+            return Err(error("dimensions", 0, expected, got));
+        }
+        if bytes.len() != size {
+            return Err(error("size", bytes.len().min(size), expected_size(), format!("{} bytes", bytes.len())));
+        }
+
+        let mut values = vec![[0.0; 3]; ENTRIES];
+        for (at, &entry) in planes.as_chunks().0.iter().enumerate() {
+            let (channel, index) = (at / ENTRIES, at % ENTRIES);
+            let entry = f64::from_le_bytes(entry);
+            let Some(value) = stored(entry * SCALE[channel]) else {
+                let field = format!("{} entry {index}", ["red", "green", "blue"][channel]);
+                let offset = HEADER_BYTES + at * size_of::<f64>();
+                return Err(error(&field, offset, "a finite number in single precision".into(), format!("{entry:e}")));
+            };
+            values[index][channel] = value;
+        }
+        Ok(Self { values })
+    }
+
+    /// Writes a `.binary` file that [`Self::from_bytes`] reads back bit for bit: the rounding of the division by the
+    /// channel's factor, and of the multiplication when read, is far below the precision of `f32`.
+    ///
+    /// # Errors
+    /// Those of `writer`.
+    pub fn write(&self, writer: &mut impl std::io::Write) -> std::io::Result<()> {
+        for dimension in [THETA_HALF, THETA_DIFF, PHI_DIFF] {
+            writer.write_all(&(dimension as i32).to_le_bytes())?;
+        }
+        for (channel, scale) in SCALE.into_iter().enumerate() {
+            let plane: Vec<u8> = self.values.iter().flat_map(|v| (f64::from(v[channel]) / scale).to_le_bytes()).collect();
+            writer.write_all(&plane)?;
+        }
+        Ok(())
+    }
+
+    /// The table for the GPU: a factor and one `E5B9G9R9_UFLOAT_PACK32` per entry, [theta_half][theta_diff][phi_diff]; an
+    /// entry's value is the factor times what [`packing::decode`] returns. The factor is 1 unless an entry is above
+    /// [`packing::MAX`], then the least power of two that brings all below.
+    pub fn packed(&self) -> (f32, Vec<u32>) {
+        let largest = self.values.iter().flatten().fold(0.0, |a: f32, &c| a.max(c));
+        let mut scale = 1.0;
+        while f64::from(largest) / scale > packing::MAX {
+            scale *= 2.0;
+        }
+        (scale as f32, self.values.iter().map(|&v| packing::encode(vector(v) / scale)).collect())
+    }
+
+    /// The value of a bin.
+    fn at(&self, half: usize, diff: usize, phi: usize) -> DVec3 {
+        vector(self.values[(half * THETA_DIFF + diff) * PHI_DIFF + phi])
+    }
+
+    /// Trilinear between bin centres, in bins; theta clamped to the outermost centres, phi_diff periodic.
+    fn interpolate(&self, angles: Angles) -> DVec3 {
+        let Angles { theta_half, theta_diff, phi_diff } = angles;
+        let (h0, h1, h) = clamped((theta_half / FRAC_PI_2).sqrt(), THETA_HALF);
+        let (d0, d1, d) = clamped(theta_diff / FRAC_PI_2, THETA_DIFF);
+        let p = phi_diff / PI * PHI_DIFF as f64 - 0.5;
+        let p0 = (p.floor() as i64).rem_euclid(PHI_DIFF as i64) as usize;
+        let (p1, p) = ((p0 + 1) % PHI_DIFF, p - p.floor());
+
+        let along_phi = |i, j| self.at(i, j, p0).lerp(self.at(i, j, p1), p);
+        let along_diff = |i| along_phi(i, d0).lerp(along_phi(i, d1), d);
+        along_diff(h0).lerp(along_diff(h1), h)
+    }
+}
+
+impl Reflectance for MerlTable {
+    fn evaluate(&self, wi: DVec3, wo: DVec3) -> DVec3 {
+        if wi.z <= 0.0 || wo.z <= 0.0 { DVec3::ZERO } else { self.interpolate(Angles::of(wi, wo)) }
+    }
+}
+
+/// The coordinates of a pair of directions on the grid, in radians.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Angles {
+    /// Between the normal and the half vector.
+    pub theta_half: f64,
+    /// Between the half vector and either direction.
+    pub theta_diff: f64,
+    /// Azimuth of the light about the half vector, 0 towards increasing theta_half; pi more or less means the directions
+    /// swapped, which reflectance does not tell apart.
+    pub phi_diff: f64,
+}
+
+impl Angles {
+    /// The angles of unit directions `wi` and `wo` above the horizon. Precise for all of them, also where the half vector
+    /// is the normal (its azimuth then counts as 0) or the directions coincide: every angle comes from an arc tangent.
+    pub fn of(wi: DVec3, wo: DVec3) -> Self {
+        let (sum, difference) = (wi + wo, wi - wo);
+        let h = sum.normalize_or(DVec3::Z);
+        let sine = h.x.hypot(h.y);
+        let azimuth = if sine > 0.0 { DVec2::new(h.x, h.y) / sine } else { DVec2::X };
+        // Tangents about the half vector; the difference of the directions is orthogonal to it.
+        let x = difference.dot(DVec3::new(azimuth.x * h.z, azimuth.y * h.z, -sine));
+        let y = difference.dot(DVec3::new(-azimuth.y, azimuth.x, 0.0));
+        Self { theta_half: sine.atan2(h.z), theta_diff: difference.length().atan2(sum.length()), phi_diff: y.atan2(x) }
+    }
+
+    /// Directions `(wi, wo)` with these angles and the half vector in the xz-plane; they can lie below the horizon.
+    pub fn directions(self) -> (DVec3, DVec3) {
+        let (h_sin, h_cos) = self.theta_half.sin_cos();
+        let (d_sin, d_cos) = self.theta_diff.sin_cos();
+        let (p_sin, p_cos) = self.phi_diff.sin_cos();
+        let along = DVec3::new(h_sin, 0.0, h_cos) * d_cos;
+        let across = DVec3::new(h_cos * p_cos, p_sin, -h_sin * p_cos) * d_sin;
+        (along + across, along - across)
+    }
+}
+
+/// A value as the table holds it: negative is 0; `None` if it is not finite in single precision.
+fn stored(value: f64) -> Option<f32> {
+    let value = value as f32;
+    value.is_finite().then_some(if value > 0.0 { value } else { 0.0 })
+}
+
+fn vector([r, g, b]: [f32; 3]) -> DVec3 {
+    DVec3::new(r.into(), g.into(), b.into())
 }

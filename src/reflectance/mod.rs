@@ -5,10 +5,12 @@ use glam::DVec3;
 pub mod ggx;
 pub mod importance;
 pub mod merl;
+pub mod packing;
 pub mod stand_in;
 
 pub use ggx::Ggx;
-pub use merl::MerlTable;
+pub use importance::ImportanceTable;
+pub use merl::{MerlError, MerlTable};
 
 /// A surface's reflectance in its local frame (z is the normal).
 pub trait Reflectance: Send + Sync {
@@ -33,4 +35,10 @@ impl Reflectance for Model {
             Self::Ggx(ggx) => ggx.evaluate(wi, wo),
         }
     }
+}
+
+/// The neighbours and the weight of the second at `unit` of an axis of `bins` over [0, 1]: linear between bin centres.
+fn clamped(unit: f64, bins: usize) -> (usize, usize, f64) {
+    let x = (unit * bins as f64 - 0.5).clamp(0.0, (bins - 1) as f64);
+    (x as usize, (x as usize + 1).min(bins - 1), x.fract())
 }
