@@ -1,7 +1,8 @@
 //! Outputs that appear whole or not at all.
 
 use crate::offline::error::{Error, Result};
-use std::io::{BufWriter, Seek, Write};
+use std::fs::File;
+use std::io::{BufWriter, Write};
 use std::path::Path;
 
 /// Writes a file through `content` under a temporary name in the target's folder, then renames it. On any failure, of
@@ -11,7 +12,7 @@ use std::path::Path;
 /// [`Error::Write`] with the system's word, also where `path` names something that is no regular file.
 pub fn write_atomically<E: ToString>(
     path: &Path,
-    content: impl FnOnce(&mut (dyn WriteSeek + '_)) -> std::result::Result<(), E>,
+    content: impl FnOnce(&mut BufWriter<&File>) -> std::result::Result<(), E>,
 ) -> Result<()> {
     let failed = |reason: &dyn ToString| Error::Write { path: path.into(), reason: one_line(&reason.to_string()) };
     // Renaming over a device or a pipe would replace it.
@@ -36,10 +37,6 @@ pub fn write_atomically<E: ToString>(
     file.persist(path).map_err(|e| failed(&e.error))?;
     Ok(())
 }
-
-/// A seekable sink: EXR files hold offsets that are written last.
-pub trait WriteSeek: Write + Seek {}
-impl<T: Write + Seek> WriteSeek for T {}
 
 fn one_line(text: &str) -> String {
     text.split_whitespace().collect::<Vec<_>>().join(" ")

@@ -57,10 +57,14 @@ pub fn read_png(path: &Path) -> Result<Png> {
 /// # Errors
 /// [`Error::Argument`] if `rgba` has another length, [`Error::Write`] if the file cannot be written.
 pub fn write_png(path: &Path, width: u32, height: u32, rgba: &[u8]) -> Result<()> {
+    let side = 1..=input::MAX_SIDE;
+    if !side.contains(&width.into()) || !side.contains(&height.into()) {
+        let expected = format!("1x1 to {0}x{0} pixels", input::MAX_SIDE);
+        return Err(Error::argument("image size", expected, format!("{width}x{height}")));
+    }
     let expected = u64::from(width) * u64::from(height) * 4;
-    if expected == 0 || rgba.len() as u64 != expected {
-        let expected = format!("4 bytes for each of {width}x{height} pixels, at least one");
-        return Err(Error::argument("PNG samples", expected, format!("{} bytes", rgba.len())));
+    if rgba.len() as u64 != expected {
+        return Err(Error::argument("PNG samples", format!("{expected} bytes"), format!("{} bytes", rgba.len())));
     }
     write_atomically(path, |file| PngEncoder::new(file).write_image(rgba, width, height, ExtendedColorType::Rgba8))
 }

@@ -16,13 +16,7 @@ use std::path::Path;
 pub fn read_obj(path: &Path) -> Result<Mesh> {
     let bytes = input::read(path)?;
     check(path, &String::from_utf8_lossy(&bytes))?;
-    let options = tobj::LoadOptions {
-        single_index: true,
-        triangulate: true,
-        ignore_points: true,
-        ignore_lines: true,
-        ..Default::default()
-    };
+    let options = tobj::LoadOptions { single_index: true, triangulate: true, ignore_points: true, ignore_lines: true };
     let text = String::from_utf8_lossy(&bytes);
     let loaded = tobj::load_obj_buf(&mut text.as_bytes(), &options, |_| Ok(Default::default()));
     let (groups, _) = loaded.map_err(|e| Error::file(path, At::File, "OBJ", "a well-formed Wavefront OBJ", e))?;

@@ -192,7 +192,8 @@ impl Check<'_> {
     /// Exactly one of `choices`.
     fn one(&self, table: &Span, choices: &[(&str, Option<Span>)]) -> Result<()> {
         let expected = format!("exactly one of {}", choices.iter().map(|(name, _)| *name).collect::<Vec<_>>().join(", "));
-        let given: Vec<_> = choices.iter().filter_map(|(name, span)| Some((*name, span.clone()?))).collect();
+        let mut given: Vec<_> = choices.iter().filter_map(|(name, span)| Some((*name, span.clone()?))).collect();
+        given.sort_by_key(|(_, span)| span.start);
         match given.as_slice() {
             [_] => Ok(()),
             [] => Err(self.source.error(table, expected, "none")),

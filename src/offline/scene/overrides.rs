@@ -20,71 +20,77 @@ pub(super) fn apply<'t>(
         starts.push((next, path.clone()));
         let segments: Vec<&str> = path.split('.').map(str::trim).collect();
         if segments.len() > MAX_DEPTH || segments.iter().any(|s| s.is_empty()) {
-            return Err(Error::argument(format!("--set {path}"), "a path such as camera.fov_y", path));
+            return Err(Error::argument("--set", "a path such as camera.fov_y", format!("`{path}`")));
         }
         // What is not TOML is a string without quotes.
         let bare = |_| Spanned::new(0..0, DeValue::String(Cow::Borrowed(text)));
         let mut value = DeValue::parse(text.trim()).unwrap_or_else(bare);
         place(&mut value, &mut next);
-        set(tree, path, &segments, value, &mut next)?;
+        Override { path, segments: &segments, next: &mut next }.enter_table(tree, 0, value)?;
     }
     Ok(starts)
 }
 
-/// Sets the value at `segments`; tables on the way are made where they are missing, list elements and materials are not.
-fn set<'t>(tree: &mut DeTable<'t>, path: &str, segments: &[&str], value: Spanned<DeValue<'t>>, next: &mut usize) -> Result<()> {
-    let mut table = tree;
-    let mut done = 0;
-    while let Some(segment) = segments.get(done) {
-        let parents = segments.get(..done).unwrap_or_default();
-        done += 1;
-        let last = done == segments.len();
-        if !table.contains_key(*segment) {
+/// One override on its way down the tree.
+struct Override<'o> {
+    path: &'o str,
+    segments: &'o [&'o str],
+    /// The next free position.
+    next: &'o mut usize,
+}
+
+impl Override<'_> {
+    /// Goes on from a table after `done` segments. Missing tables are made; materials are not.
+    fn enter_table<'t>(&mut self, table: &mut DeTable<'t>, done: usize, value: Spanned<DeValue<'t>>) -> Result<()> {
+        let Some(segment) = self.segments.get(done).copied() else { return Ok(()) };
+        let parents = self.segments.get(..done).unwrap_or_default();
+        if !table.contains_key(segment) {
             if parents == ["materials"] {
                 let names: Vec<_> = table.keys().map(|k| k.get_ref().to_string()).collect();
-                return Err(Error::argument(format!("--set {path}"), format!("a material: {}", names.join(", ")), segment));
+                return Err(self.error(format!("a material: {}", names.join(", ")), format!("`{segment}`")));
             }
             // Another choice of a "one of" group takes the old one's place.
             let others = alternatives(parents);
-            if others.contains(segment) {
-                table.retain(|key, _| !others.contains(&key.get_ref().as_ref()));
+            if others.contains(&segment) {
+                others.iter().for_each(|other| drop(table.remove(*other)));
             }
-            let key = Spanned::new(*next..*next + 1, Cow::Owned(segment.to_string()));
-            let empty = Spanned::new(*next..*next + 1, DeValue::Table(DeTable::new()));
-            *next += 1;
+            let key = Spanned::new(*self.next..*self.next + 1, Cow::Owned(segment.to_string()));
+            let empty = Spanned::new(*self.next..*self.next + 1, DeValue::Table(DeTable::new()));
+            *self.next += 1;
             table.insert(key, empty);
         }
-        let Some(mut slot) = table.get_mut(*segment) else { break };
-        if last {
+        match table.get_mut(segment) {
+            Some(slot) => self.enter(slot, done + 1, value),
+            None => Ok(()),
+        }
+    }
+
+    /// Goes on from any value after `done` segments. List elements must be there.
+    fn enter<'t>(&mut self, slot: &mut Spanned<DeValue<'t>>, done: usize, value: Spanned<DeValue<'t>>) -> Result<()> {
+        let Some(segment) = self.segments.get(done).copied() else {
             *slot = value;
             return Ok(());
-        }
-        // List elements on the way.
-        while let DeValue::Array(_) = slot.get_ref() {
-            let index = segments.get(done).copied().unwrap_or_default();
-            done += 1;
-            let DeValue::Array(array) = slot.get_mut() else { break };
-            let count = array.len();
-            let element = index.parse::<usize>().ok().and_then(|i| array.get_mut(i));
-            let Some(element) = element else {
-                return Err(Error::argument(format!("--set {path}"), format!("an index below {count}"), index));
-            };
-            if done == segments.len() {
-                *element = value;
-                return Ok(());
-            }
-            slot = element;
-        }
-        let kind = slot.get_ref().type_str();
+        };
         match slot.get_mut() {
-            DeValue::Table(inner) => table = inner,
-            _ => {
-                let field = segments.get(..done).unwrap_or_default().join(".");
-                return Err(Error::argument(format!("--set {path}"), format!("a table at {field}"), format!("a {kind}")));
+            DeValue::Table(table) => self.enter_table(table, done, value),
+            DeValue::Array(array) => {
+                let count = array.len();
+                let element = segment.parse::<usize>().ok().and_then(|i| array.get_mut(i));
+                let Some(element) = element else {
+                    return Err(self.error(format!("an index below {count}"), format!("`{segment}`")));
+                };
+                self.enter(element, done + 1, value)
+            }
+            other => {
+                let parents = self.segments.get(..done).unwrap_or_default().join(".");
+                Err(self.error(format!("a table or list at {parents}"), format!("a {}", other.type_str())))
             }
         }
     }
-    Ok(())
+
+    fn error(&self, expected: String, got: String) -> Error {
+        Error::argument(format!("--set {}", self.path), expected, got)
+    }
 }
 
 /// Keys of which a table holds exactly one.
