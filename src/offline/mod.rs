@@ -1,8 +1,13 @@
 //! Headless rendering from files: scenes, meshes, images, the device, read-back, metrics and the f64 reference.
 //! The only part of the crate that creates instances, devices or queues, reads files or the environment, or prints.
 
+pub mod builtin;
+pub mod environment;
 pub mod error;
 pub mod headless;
+pub mod image_io;
+mod input;
 pub mod mesh;
+pub mod scene;
 pub mod session;
 pub mod world;

@@ -1,0 +1,42 @@
+//! Reading whole input files, with errors that say what the file is instead.
+
+use crate::offline::error::{At, Error, Result};
+use std::path::Path;
+
+/// The largest image side that any reader accepts, in pixels.
+pub(crate) const MAX_SIDE: u64 = 16_384;
+
+/// Every byte of the regular, non-empty file at `path`.
+///
+/// # Errors
+/// [`Error::File`] if it is missing, unreadable, empty or no regular file.
+pub(crate) fn read(path: &Path) -> Result<Vec<u8>> {
+    let unreadable = |e: std::io::Error| Error::file(path, At::File, "file", "a readable file", e);
+    let found = std::fs::metadata(path).map_err(unreadable)?;
+    if !found.is_file() {
+        let kind = if found.is_dir() { "a directory" } else { "a special file" };
+        return Err(Error::file(path, At::File, "file", "a regular file", kind));
+    }
+    let bytes = std::fs::read(path).map_err(unreadable)?;
+    if bytes.is_empty() {
+        return Err(Error::file(path, At::File, "file", "content", "0 bytes"));
+    }
+    Ok(bytes)
+}
+
+/// The file name's extension in lower case, without the dot; empty if there is none.
+pub(crate) fn extension(path: &Path) -> String {
+    path.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default()
+}
+
+/// Refuses sizes that no image of ours has, before anything is allocated.
+///
+/// # Errors
+/// [`Error::File`] unless both sides are in 1 to `max`.
+pub(crate) fn check_size(path: &Path, [width, height]: [u64; 2], max: [u64; 2]) -> Result<()> {
+    if (1..=max[0]).contains(&width) && (1..=max[1]).contains(&height) {
+        return Ok(());
+    }
+    let expected = format!("1x1 to {}x{} pixels", max[0], max[1]);
+    Err(Error::file(path, At::File, "image size", expected, format!("{width}x{height}")))
+}

@@ -1,0 +1,231 @@
+//! The keys of a scene file, as serde reads them: every key that the format knows, with its type. What the values may
+//! be is checked in [`super::check`].
+//!
+//! Beside the format's own wording: `rotate` turns about X, then Y, then Z; translation comes last and scaling first.
+//! Colours and scales may be one number for all three. Keyframes carry their `frame`; animated objects are
+//! `[[animation.objects]]` with `object = INDEX` and `keyframes = [...]`.
+
+use serde::Deserialize;
+use std::collections::BTreeMap;
+use toml::Spanned;
+
+type Key<T> = Option<Spanned<T>>;
+pub(super) type Vector = [f64; 3];
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct SceneFile {
+    pub camera: Camera,
+    pub environment: Key<Environment>,
+    #[serde(default)]
+    pub lights: Vec<Spanned<Light>>,
+    pub objects: Spanned<Vec<Spanned<Object>>>,
+    #[serde(default)]
+    pub materials: BTreeMap<String, Spanned<Material>>,
+    pub animation: Key<Animation>,
+    #[serde(default)]
+    pub settings: Settings,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Camera {
+    pub position: Spanned<Vector>,
+    pub target: Key<Vector>,
+    pub up: Key<Vector>,
+    pub fov_y: Key<f64>,
+    pub size: Key<[u32; 2]>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Environment {
+    pub map: Key<String>,
+    pub builtin: Key<String>,
+    pub intensity: Key<f64>,
+    pub rotation: Key<f64>,
+    #[serde(default)]
+    pub visible: bool,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Light {
+    pub r#type: Spanned<String>,
+    pub position: Key<Vector>,
+    pub direction: Key<Vector>,
+    pub u: Key<Vector>,
+    pub v: Key<Vector>,
+    pub radius: Key<f64>,
+    pub intensity: Key<Triple>,
+    pub irradiance: Key<Triple>,
+    pub radiance: Key<Triple>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Object {
+    pub mesh: Key<String>,
+    pub builtin: Key<String>,
+    pub material: Spanned<String>,
+    pub uv: Key<String>,
+    pub translate: Key<Vector>,
+    pub rotate: Key<Vector>,
+    pub scale: Key<Triple>,
+    pub transform: Key<[f64; 16]>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Material {
+    pub reflectance: Spanned<Reflectance>,
+    pub albedo_map: Key<String>,
+    pub specular_map: Key<String>,
+    pub normal_map: Key<String>,
+    pub height_map: Key<String>,
+    pub height_scale: Key<f64>,
+    pub displace: Key<bool>,
+    pub roughness_map: Key<String>,
+    pub roughness: Key<String>,
+    pub tiling: Key<[f64; 2]>,
+    pub normal_encoding: Key<String>,
+    pub normal_y: Key<String>,
+}
+
+/// The keys of [`Reflectance`], of which a material has one.
+pub(super) const REFLECTANCES: &[&str] = &["merl", "sgd", "rgl", "ggx", "blinn_phong", "vmf", "builtin"];
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Reflectance {
+    pub merl: Key<String>,
+    pub sgd: Key<Sgd>,
+    pub rgl: Key<String>,
+    pub ggx: Key<Ggx>,
+    pub blinn_phong: Key<BlinnPhong>,
+    pub vmf: Key<Vec<Vmf>>,
+    pub builtin: Key<String>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Sgd {
+    pub table: Spanned<String>,
+    pub name: Spanned<String>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Ggx {
+    pub alpha: Spanned<f64>,
+    pub f0: Spanned<Triple>,
+    pub albedo: Spanned<Triple>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct BlinnPhong {
+    pub exponent: Spanned<f64>,
+    pub specular: Spanned<Triple>,
+    pub albedo: Spanned<Triple>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Vmf {
+    pub mu: Spanned<Vector>,
+    pub kappa: Spanned<f64>,
+    pub weight: Spanned<f64>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Animation {
+    pub frames: Spanned<u32>,
+    #[serde(default)]
+    pub camera: Vec<CameraKey>,
+    #[serde(default)]
+    pub objects: Vec<AnimatedObject>,
+    pub wave: Option<Wave>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct CameraKey {
+    pub frame: Spanned<u32>,
+    pub position: Key<Vector>,
+    pub target: Key<Vector>,
+    pub up: Key<Vector>,
+    pub fov_y: Key<f64>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct AnimatedObject {
+    pub object: Spanned<u32>,
+    pub keyframes: Vec<ObjectKey>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct ObjectKey {
+    pub frame: Spanned<u32>,
+    pub translate: Key<Vector>,
+    pub rotate: Key<Vector>,
+    pub scale: Key<Triple>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Wave {
+    pub amplitude: Spanned<f64>,
+    pub length: Spanned<f64>,
+    pub speed: Spanned<f64>,
+}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Settings {
+    pub operator: Key<String>,
+    pub combine: Key<String>,
+    pub eps: Key<f64>,
+    pub np_rule: Key<String>,
+    pub budget: Key<f64>,
+    pub lmax: Key<u32>,
+    pub bins: Key<String>,
+    pub eps0: Key<f64>,
+    pub eps1: Key<f64>,
+    pub anisotropy: Key<f64>,
+    pub lod_bias: Key<f64>,
+    pub geometric: Key<bool>,
+}
+
+/// Three numbers, or one for all three.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Triple(pub Vector);
+
+impl<'de> Deserialize<'de> for Triple {
+    fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Visitor;
+        impl<'de> serde::de::Visitor<'de> for Visitor {
+            type Value = Triple;
+
+            fn expecting(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+                f.write_str("a number or three numbers")
+            }
+
+            fn visit_f64<E>(self, v: f64) -> Result<Triple, E> {
+                Ok(Triple([v; 3]))
+            }
+
+            fn visit_i64<E>(self, v: i64) -> Result<Triple, E> {
+                Ok(Triple([v as f64; 3]))
+            }
+
+            fn visit_seq<A: serde::de::SeqAccess<'de>>(self, seq: A) -> Result<Triple, A::Error> {
+                Vector::deserialize(serde::de::value::SeqAccessDeserializer::new(seq)).map(Triple)
+            }
+        }
+        deserializer.deserialize_any(Visitor)
+    }
+}

@@ -1,0 +1,187 @@
+//! Rules for the keys that the format knows and this version cannot do yet: their values are checked like all others.
+
+use crate::offline::error::Result;
+use crate::offline::scene::check::{Check, span};
+use crate::offline::scene::format::{Animation, Light, Material, Reflectance, Settings, Triple, Vector};
+use crate::offline::scene::source::Span;
+use glam::DVec3;
+use toml::Spanned;
+
+impl Check<'_> {
+    pub(super) fn light(&mut self, light: &Spanned<Light>) -> Result<()> {
+        let l = light.get_ref();
+        let given = [
+            ("position", span(&l.position)),
+            ("direction", span(&l.direction)),
+            ("u", span(&l.u)),
+            ("v", span(&l.v)),
+            ("radius", span(&l.radius)),
+            ("intensity", span(&l.intensity)),
+            ("irradiance", span(&l.irradiance)),
+            ("radiance", span(&l.radiance)),
+        ];
+        self.name(&l.r#type, &["point", "directional", "sphere", "rectangle"])?;
+        let wanted: &[&str] = match l.r#type.get_ref().as_str() {
+            "point" => &["position", "intensity"],
+            "directional" => &["direction", "irradiance"],
+            "sphere" => &["position", "radius", "radiance"],
+            _ => &["position", "u", "v", "radiance"],
+        };
+        let expected = format!("{} of a {} light", wanted.join(", "), l.r#type.get_ref());
+        for (name, at) in given {
+            match at {
+                None if wanted.contains(&name) => {
+                    return Err(self.source.error(&light.span(), expected, format!("no {name}")));
+                }
+                Some(at) if !wanted.contains(&name) => return Err(self.source.error(&at, expected, name)),
+                _ => {}
+            }
+        }
+        self.each(&l.position, Self::vector)?;
+        for vector in [&l.direction, &l.u, &l.v] {
+            self.each(vector, Self::direction)?;
+        }
+        self.each(&l.radius, |c, v| c.number(v, "a number above 0", |v| v > 0.0))?;
+        for colour in [&l.intensity, &l.irradiance, &l.radiance] {
+            self.each(colour, |c, v| {
+                let Triple(rgb) = v.get_ref();
+                let fits = rgb.iter().all(|c| c.is_finite() && *c >= 0.0);
+                c.require(fits, &v.span(), "finite channels >= 0", format!("{rgb:?}"))
+            })?;
+        }
+        self.later.push(light.span());
+        Ok(())
+    }
+
+    pub(super) fn maps(&mut self, m: &Material) -> Result<()> {
+        for map in [&m.albedo_map, &m.specular_map, &m.normal_map, &m.height_map, &m.roughness_map] {
+            self.each(map, |c, v| c.extension(v, &["png", "jpg", "jpeg", "exr", "hdr"]).map(drop))?;
+            self.later.extend(span(map));
+        }
+        self.each(&m.height_scale, |c, v| c.number(v, "metres", |_| true))?;
+        self.each(&m.roughness, |c, v| c.name(v, &["alpha", "kappa"]))?;
+        self.each(&m.normal_encoding, |c, v| c.name(v, &["auto", "unit", "signed"]))?;
+        self.each(&m.normal_y, |c, v| c.name(v, &["up", "down"]))?;
+        self.each(&m.tiling, |c, v| {
+            let fits = v.get_ref().iter().all(|c| c.is_finite() && *c > 0.0);
+            c.require(fits, &v.span(), "two numbers above 0", format!("{:?}", v.get_ref()))
+        })?;
+        let needs: [(Option<Span>, &str, bool); 5] = [
+            (span(&m.height_scale), "height_map", m.height_map.is_some()),
+            (span(&m.displace), "height_map", m.height_map.is_some()),
+            (span(&m.roughness), "roughness_map", m.roughness_map.is_some()),
+            (span(&m.normal_encoding), "normal_map", m.normal_map.is_some()),
+            (span(&m.normal_y), "normal_map", m.normal_map.is_some()),
+        ];
+        for (at, map, there) in needs {
+            if let Some(at) = at {
+                self.require(there, &at, &format!("a {map} beside it"), "none")?;
+                self.later.push(at);
+            }
+        }
+        self.later.extend(span(&m.tiling));
+        Ok(())
+    }
+
+    pub(super) fn other_reflectances(&mut self, r: &Reflectance) -> Result<()> {
+        self.each(&r.sgd, |c, v| {
+            c.extension(&v.get_ref().table, &["csv"])?;
+            c.text(&v.get_ref().name)
+        })?;
+        self.each(&r.rgl, |c, v| c.extension(v, &["bsdf"]).map(drop))?;
+        self.each(&r.blinn_phong, |c, v| {
+            c.number(&v.get_ref().exponent, "a number >= 0", |v| v >= 0.0)?;
+            c.fraction(&v.get_ref().specular)?;
+            c.fraction(&v.get_ref().albedo)
+        })?;
+        self.each(&r.vmf, |c, lobes| {
+            c.require(!lobes.get_ref().is_empty(), &lobes.span(), "at least one lobe", "none")?;
+            for lobe in lobes.get_ref() {
+                c.direction(&lobe.mu)?;
+                c.number(&lobe.kappa, "a number >= 0", |v| v >= 0.0)?;
+                c.number(&lobe.weight, "a number >= 0", |v| v >= 0.0)?;
+            }
+            Ok(())
+        })?;
+        self.later.extend([span(&r.sgd), span(&r.rgl), span(&r.blinn_phong), span(&r.vmf)].into_iter().flatten());
+        Ok(())
+    }
+
+    pub(super) fn animation(&mut self, animation: &Spanned<Animation>, objects: usize) -> Result<()> {
+        let a = animation.get_ref();
+        let frames = *a.frames.get_ref();
+        self.require(frames > 0, &a.frames.span(), "at least one frame", frames)?;
+        let mut last = None;
+        for key in &a.camera {
+            self.frame(&key.frame, frames, &mut last)?;
+            self.each(&key.position, Self::vector)?;
+            self.each(&key.target, Self::vector)?;
+            self.each(&key.up, Self::direction)?;
+            self.each(&key.fov_y, |c, v| c.number(v, "0 < degrees < 180", |v| v > 0.0 && v < 180.0))?;
+        }
+        for object in &a.objects {
+            let index = *object.object.get_ref();
+            let expected = format!("an index below {objects}");
+            self.require((index as usize) < objects, &object.object.span(), &expected, index)?;
+            let mut last = None;
+            for key in &object.keyframes {
+                self.frame(&key.frame, frames, &mut last)?;
+                self.each(&key.translate, Self::vector)?;
+                self.each(&key.rotate, Self::vector)?;
+                self.each(&key.scale, Self::scale)?;
+            }
+        }
+        if let Some(wave) = &a.wave {
+            self.number(&wave.amplitude, "a number >= 0", |v| v >= 0.0)?;
+            self.number(&wave.length, "a number above 0", |v| v > 0.0)?;
+            self.number(&wave.speed, "a finite number", |_| true)?;
+        }
+        self.later.push(animation.span());
+        Ok(())
+    }
+
+    pub(super) fn settings(&mut self, s: &Settings) -> Result<()> {
+        self.each(&s.operator, |c, v| c.name(v, &["box", "clipped", "covariance"]))?;
+        self.each(&s.combine, |c, v| c.name(v, &["mean", "max"]))?;
+        self.each(&s.np_rule, |c, v| c.name(v, &["constant", "eq8", "sqrt", "relstd"]))?;
+        self.each(&s.bins, |c, v| c.name(v, &["camera", "tangent"]))?;
+        for threshold in [&s.eps, &s.eps0, &s.eps1] {
+            self.each(threshold, |c, v| c.number(v, "0 < threshold < 1", |v| v > 0.0 && v < 1.0))?;
+        }
+        self.each(&s.budget, |c, v| c.number(v, "a number above 0", |v| v > 0.0))?;
+        self.each(&s.lmax, |c, v| c.require(*v.get_ref() <= 14, &v.span(), "a level from 0 to 14", v.get_ref()))?;
+        self.each(&s.anisotropy, |c, v| c.number(v, "1 to 16", |v| (1.0..=16.0).contains(&v)))?;
+        self.each(&s.lod_bias, |c, v| c.number(v, "-16 to 16", |v| v.abs() <= 16.0))?;
+        let all = [
+            span(&s.operator),
+            span(&s.combine),
+            span(&s.eps),
+            span(&s.np_rule),
+            span(&s.budget),
+            span(&s.lmax),
+            span(&s.bins),
+            span(&s.eps0),
+            span(&s.eps1),
+            span(&s.anisotropy),
+            span(&s.lod_bias),
+            span(&s.geometric),
+        ];
+        self.later.extend(all.into_iter().flatten());
+        Ok(())
+    }
+
+    /// A finite vector that has a direction.
+    fn direction(&mut self, value: &Spanned<Vector>) -> Result<()> {
+        let v = DVec3::from(*value.get_ref());
+        self.require(v.is_finite() && v.length() > 0.0, &value.span(), "a finite vector that is not 0", v)
+    }
+
+    /// A keyframe's number: within the animation and after the one before.
+    fn frame(&self, value: &Spanned<u32>, frames: u32, last: &mut Option<u32>) -> Result<()> {
+        let frame = *value.get_ref();
+        let fits = frame < frames && last.is_none_or(|last| frame > last);
+        self.require(fits, &value.span(), &format!("rising frames below {frames}"), frame)?;
+        *last = Some(frame);
+        Ok(())
+    }
+}

@@ -1,0 +1,88 @@
+//! Scene files: TOML in, a resolved [`World`] out.
+
+use crate::offline::error::{At, Error, Result};
+use crate::offline::input;
+use crate::offline::world::World;
+use std::path::{Path, PathBuf};
+
+mod check;
+mod format;
+mod later;
+mod materials;
+mod overrides;
+mod resolve;
+mod source;
+
+/// Name and text of the scenes that need no other file.
+const BUILTINS: [(&str, &str); 5] = [
+    ("trio", include_str!("../../../scenes/trio.toml")),
+    ("sphere", include_str!("../../../scenes/sphere.toml")),
+    ("bumpy-sphere", include_str!("../../../scenes/bumpy-sphere.toml")),
+    ("torus-knot", include_str!("../../../scenes/torus-knot.toml")),
+    ("furnace", include_str!("../../../scenes/furnace.toml")),
+];
+
+/// A scene file that has been read and checked, but whose meshes, maps and tables are still on disk.
+#[derive(Debug)]
+pub struct Scene {
+    name: String,
+    /// What relative paths are relative to.
+    folder: PathBuf,
+    source: source::Source,
+    file: format::SceneFile,
+}
+
+impl Scene {
+    /// Reads the built-in scene `scene`, or else the scene file of that path, with `overrides` applied in order: pairs of
+    /// a dotted path (`camera.fov_y`, `objects.0.material`) and a TOML value, or a string without quotes. An override that
+    /// makes another choice (`materials.paint.reflectance.merl` over a `builtin`) replaces the old one. Paths
+    /// are relative to the scene file, and to the working directory in built-in scenes.
+    ///
+    /// # Errors
+    /// [`Error::File`] with the line of whatever is unknown, missing, of another type or out of range;
+    /// [`Error::Argument`] if an override brought it, or for a name that is neither; [`Error::NotSupportedYet`] for keys
+    /// that are right but beyond this version.
+    pub fn load(scene: &str, overrides: &[(String, String)]) -> Result<Self> {
+        if let Some((name, text)) = BUILTINS.iter().find(|(name, _)| *name == scene) {
+            return Self::parse(name, PathBuf::from(format!("<{name}>")), PathBuf::new(), text.to_string(), overrides);
+        }
+        let path = Path::new(scene);
+        if input::extension(path) != "toml" && !path.exists() {
+            let names = BUILTINS.map(|(name, _)| name).join(", ");
+            return Err(Error::argument("scene", format!("a scene file or one of {names}"), format!("`{scene}`")));
+        }
+        let bytes = input::read(path)?;
+        let text = String::from_utf8(bytes).map_err(|e| {
+            let at = At::Byte(e.utf8_error().valid_up_to() as u64);
+            Error::file(path, at, "scene", "UTF-8 text", "another byte")
+        })?;
+        let folder = path.parent().unwrap_or(Path::new("")).to_path_buf();
+        let name = path.file_stem().unwrap_or_default().to_string_lossy();
+        Self::parse(&name, path.to_path_buf(), folder, text, overrides)
+    }
+
+    fn parse(name: &str, path: PathBuf, folder: PathBuf, text: String, overrides: &[(String, String)]) -> Result<Self> {
+        let (source, file) = source::Source::parse(path, text, overrides)?;
+        check::scene(&source, &file)?;
+        Ok(Self { name: name.to_string(), folder, source, file })
+    }
+
+    /// The scene file's stem or the built-in's name.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// Loads every file that the scene names, and makes what it takes from formulas.
+    ///
+    /// # Errors
+    /// [`Error::File`] for the file that is missing, malformed or out of range.
+    pub fn resolve(&self) -> Result<World> {
+        resolve::world(self)
+    }
+
+    /// Names of the built-in scenes, each with a line that describes it.
+    pub fn builtin_names() -> Vec<(&'static str, &'static str)> {
+        let describe = |text: &'static str| text.lines().next().unwrap_or_default().trim_start_matches(['#', ' ']);
+        BUILTINS.iter().map(|(name, text)| (*name, describe(text))).collect()
+    }
+}
