@@ -156,7 +156,7 @@ fn resolve(
         included.error.get_or_insert(error);
         return Err(message);
     };
-    let path = without_dots(&path);
+    let path = crate::without_dots(&path);
     let label = options.label(&path);
     let content = read_text(&path, &label).map_err(|error| {
         let message = error.to_string();
@@ -165,20 +165,4 @@ fn resolve(
     })?;
     included.files.insert(label.clone(), (path, content.clone()));
     Ok(ResolvedInclude { resolved_name: label, content })
-}
-
-/// `a/b/../c` as `a/c`, so that one file has one label however it is reached.
-fn without_dots(path: &Path) -> PathBuf {
-    use std::path::Component::{CurDir, Normal, ParentDir};
-    let mut out = PathBuf::new();
-    for part in path.components() {
-        match part {
-            CurDir => {}
-            ParentDir if matches!(out.components().next_back(), Some(Normal(_))) => {
-                out.pop();
-            }
-            other => out.push(other),
-        }
-    }
-    out
 }

@@ -76,18 +76,30 @@ impl Options {
         Ok(sets)
     }
 
-    /// `path` relative to the root with `/` between its parts; a path outside the root keeps only its last two parts, so
-    /// that no machine's folders reach a manifest.
+    /// `path` relative to the root with `/` between its parts, so that no machine's folders reach a manifest.
     pub(crate) fn label(&self, path: &Path) -> String {
-        let parts = |p: &Path| p.components().map(|c| c.as_os_str().to_string_lossy().into_owned()).collect::<Vec<_>>();
-        match path.strip_prefix(&self.root) {
-            Ok(inside) => parts(inside).join("/"),
-            Err(_) => {
-                let all = parts(path);
-                all.iter().skip(all.len().saturating_sub(2)).cloned().collect::<Vec<_>>().join("/")
+        let (root, path) = (without_dots(&self.root), without_dots(path));
+        let shared = root.components().zip(path.components()).take_while(|(a, b)| a == b).count();
+        let up = root.components().skip(shared).map(|_| "..".into());
+        let down = path.components().skip(shared).map(|part| part.as_os_str().to_string_lossy().into_owned());
+        up.chain(down).collect::<Vec<_>>().join("/")
+    }
+}
+
+/// `a/./b/../c` as `a/c`, so that one file has one label however it is reached.
+pub(crate) fn without_dots(path: &Path) -> PathBuf {
+    use std::path::Component::{CurDir, Normal, ParentDir};
+    let mut out = PathBuf::new();
+    for part in path.components() {
+        match part {
+            CurDir => {}
+            ParentDir if matches!(out.components().next_back(), Some(Normal(_))) => {
+                out.pop();
             }
+            other => out.push(other),
         }
     }
+    out
 }
 
 /// Compiles every selected stage file and variant, in the order of module names.
