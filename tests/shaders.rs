@@ -62,7 +62,8 @@ fn reflect(words: &[u32]) -> Result<Reflection, String> {
     for variable in &entry.vars {
         match variable {
             Variable::Descriptor { desc_bind, desc_ty, nbind, .. } => {
-                if bindings.insert((desc_bind.set(), desc_bind.bind()), (desc_ty.clone(), *nbind)).is_some() {
+                let (at, what) = (desc_bind.into_inner(), (desc_ty.clone(), *nbind));
+                if bindings.insert(at, what).is_some() {
                     return Err(format!("two resources at {desc_bind}"));
                 }
             }
@@ -113,6 +114,9 @@ struct ModuleInterface {
     bindings: Vec<(u32, u32, vk::DescriptorType)>,
 }
 
+/// One set's bindings, as (set, binding, raw kind), and those that shaders use.
+type UsedLayouts = BTreeMap<Vec<(u32, u32, i32)>, BTreeSet<(u32, u32)>>;
+
 /// Where Rust and the modules disagree; empty if they do not.
 ///
 /// Every module has a row and every row a module. A shader's binding is in Rust's layout with the same kind. A layout may
@@ -121,7 +125,7 @@ struct ModuleInterface {
 /// in the same order their offsets agree.
 fn interface_errors(rows: &[ModuleInterface], modules: &BTreeMap<String, Reflection>) -> Vec<String> {
     let mut errors = Vec::new();
-    let mut shared: BTreeMap<Vec<(u32, u32, i32)>, BTreeSet<(u32, u32)>> = BTreeMap::new();
+    let mut shared = UsedLayouts::new();
     for name in modules.keys().filter(|name| rows.iter().all(|row| row.name != name.as_str())) {
         errors.push(format!("{name}: a module that Rust does not list"));
     }
