@@ -1,6 +1,7 @@
 //! Headless rendering from files: scenes, meshes, images, the device, read-back, metrics and the f64 reference.
 //! The only part of the crate that creates instances, devices or queues, reads files or the environment, or prints.
 
+pub mod aov;
 pub mod builtin;
 pub mod environment;
 pub mod error;
@@ -8,6 +9,8 @@ pub mod headless;
 pub mod image_io;
 mod input;
 pub mod mesh;
+pub mod render;
 pub mod scene;
 pub mod session;
+pub mod stats;
 pub mod world;

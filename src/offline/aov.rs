@@ -1,0 +1,127 @@
+//! Layers beside radiance: what the frame's own images hold, at one shading sample an output pixel.
+
+use crate::offline::error::{Error, Result};
+use crate::offline::session::Session;
+
+/// A layer that `--aov` names.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Aov {
+    /// Distance along the view axis in metres; 0 for the background.
+    Depth,
+    /// World normal as interpolated.
+    Normal,
+    /// Material index, -1 for the background.
+    Material,
+    /// Object index, -1 for the background.
+    Object,
+    /// Texture coordinate.
+    Uv,
+    /// d(uv)/dx and d(uv)/dy.
+    Footprint,
+    /// Principal curvatures in 1/m, the larger in magnitude first, positive where convex.
+    Curvature,
+    /// 1 where the sample was shaded by itself.
+    Shaded,
+    /// Directions drawn for the sample.
+    Samples,
+}
+
+const ALL: [(&str, Aov); 9] = [
+    ("depth", Aov::Depth),
+    ("normal", Aov::Normal),
+    ("material", Aov::Material),
+    ("object", Aov::Object),
+    ("uv", Aov::Uv),
+    ("footprint", Aov::Footprint),
+    ("curvature", Aov::Curvature),
+    ("shaded", Aov::Shaded),
+    ("samples", Aov::Samples),
+];
+const LATER: [&str; 6] = ["level", "bandwidth", "spread", "lobes", "mip", "parent-weight"];
+
+impl std::str::FromStr for Aov {
+    type Err = Error;
+
+    fn from_str(name: &str) -> Result<Self> {
+        if let Some((_, aov)) = ALL.iter().find(|(n, _)| *n == name) {
+            return Ok(*aov);
+        }
+        if LATER.contains(&name) {
+            return Err(Error::NotSupportedYet { what: format!("--aov {name}") });
+        }
+        let names = ALL.map(|(n, _)| n).join(", ");
+        Err(Error::argument("--aov", format!("some of {names}"), format!("`{name}`")))
+    }
+}
+
+/// A channel of a layered image: its name and row-major samples.
+pub type Channel = (String, Vec<f32>);
+
+/// The samples of one of the renderer's images that stand for output pixels: the middle sample of each, rounded up.
+struct Pixels {
+    words: Vec<u32>,
+    components: usize,
+    width: usize,
+    side: usize,
+    output: [usize; 2],
+}
+
+impl Pixels {
+    fn read(session: &mut Session, image: &str, side: u32) -> Result<Self> {
+        let (bytes, format, [width, height]) = session.image(image)?;
+        let words = if format == ash::vk::Format::R16G16B16A16_SFLOAT {
+            bytemuck::pod_collect_to_vec::<u8, half::f16>(&bytes).into_iter().map(|h| h.to_f32().to_bits()).collect()
+        } else {
+            bytemuck::pod_collect_to_vec(&bytes)
+        };
+        let texels = width as usize * height as usize;
+        let components = words.len() / texels;
+        let output = [width / side, height / side].map(|e| e as usize);
+        Ok(Self { words, components, width: width as usize, side: side as usize, output })
+    }
+
+    fn map(&self, f: impl Fn(&[u32]) -> f32) -> Vec<f32> {
+        let [width, height] = self.output;
+        let at = |x: usize, y: usize| {
+            let (x, y) = (x * self.side + self.side / 2, y * self.side + self.side / 2);
+            let texel = (y * self.width + x) * self.components;
+            &self.words[texel..texel + self.components]
+        };
+        (0..width * height).map(|i| f(at(i % width, i / width))).collect()
+    }
+}
+
+impl Aov {
+    /// Whether the curvature pass must run.
+    pub fn needs_curvature(self) -> bool {
+        self == Self::Curvature
+    }
+
+    /// The layer's channels after a frame of `side` samples a side and `directions` a sample.
+    ///
+    /// # Errors
+    /// The device's, on read-back.
+    pub fn read(self, session: &mut Session, side: u32, directions: u32) -> Result<Vec<Channel>> {
+        let name = ALL.iter().find(|(_, a)| *a == self).map_or("", |(n, _)| n);
+        let covered = Pixels::read(session, "ids", side)?;
+        let mask = covered.map(|t| if t[0] == 0 { 0.0 } else { 1.0 });
+        // Background texels are cleared to zero bits, which every float reads as 0.
+        let float = |image: &str, letters: &str, first: usize, session: &mut Session| -> Result<Vec<Channel>> {
+            let pixels = Pixels::read(session, image, side)?;
+            let channel = |(i, c): (usize, char)| (format!("{name}.{c}"), pixels.map(|t| f32::from_bits(t[first + i])));
+            Ok(letters.chars().enumerate().map(channel).collect())
+        };
+        let scalar = |values: Vec<f32>| Ok(vec![(format!("{name}.Y"), values)]);
+        match self {
+            Self::Depth => float("surface", "Z", 3, session),
+            Self::Normal => float("surface", "XYZ", 0, session),
+            Self::Uv => float("coordinate", "XY", 0, session),
+            Self::Footprint => float("derivative", "XYZW", 0, session),
+            Self::Curvature => float("curvature", "XY", 0, session),
+            Self::Material => scalar(covered.map(|t| t[0].checked_sub(1).map_or(-1.0, |id| (id & 0xffff) as f32))),
+            Self::Object => scalar(covered.map(|t| t[0].checked_sub(1).map_or(-1.0, |id| (id >> 16) as f32))),
+            Self::Shaded => scalar(mask),
+            Self::Samples => scalar(mask.iter().map(|m| m * directions as f32).collect()),
+        }
+    }
+}

@@ -1,0 +1,144 @@
+//! A still image of a world, with its layers and statistics.
+
+use crate::gpu::timer::FrameTimings;
+use crate::offline::aov::Aov;
+use crate::offline::error::Result;
+use crate::offline::headless::{Headless, Options};
+use crate::offline::image_io::LinearImage;
+use crate::offline::session::Session;
+use crate::offline::stats::{Pixels, Quantiles, Samples, Stats, pass_times};
+use crate::offline::world::World;
+use crate::{Config, Estimator, Requirements};
+use serde_json::json;
+use std::collections::BTreeMap;
+
+/// Frames before timing starts.
+const WARM_UP: u32 = 2;
+/// Frames that are timed.
+const TIMED: u32 = 5;
+/// Directions of one frame of a reference: independent frames are averaged, so that no single dispatch runs for minutes.
+const REFERENCE_CHUNK: u32 = 1024;
+
+/// What to render.
+#[derive(Clone, Debug)]
+pub struct Settings {
+    /// Output pixels.
+    pub extent: [u32; 2],
+    /// Directions a shaded sample.
+    pub samples: u32,
+    /// Estimator.
+    pub estimator: Estimator,
+    /// Shading samples a side of a pixel.
+    pub samples_per_side: u32,
+    /// Seed of the sample points.
+    pub seed: u32,
+    /// Extra layers.
+    pub aovs: Vec<Aov>,
+    /// Directions a pixel of a converged image instead, with the default estimator.
+    pub reference: Option<u32>,
+    /// Whether to time frames.
+    pub timed: bool,
+    /// Device.
+    pub device: Options,
+}
+
+impl Settings {
+    fn config(&self) -> Config {
+        Config {
+            samples_per_side: self.samples_per_side,
+            frames_in_flight: 1,
+            estimator: if self.reference.is_some() { Estimator::Mis } else { self.estimator },
+            directions: self.reference.map_or(self.samples, |n| n.min(REFERENCE_CHUNK)),
+            curvature: self.aovs.iter().any(|a| a.needs_curvature()),
+            ..Config::new(self.extent)
+        }
+    }
+}
+
+/// An image and what it took.
+pub struct Rendered {
+    /// Linear radiance, coverage and the extra layers.
+    pub image: LinearImage,
+    /// Statistics; times are zero unless [`Settings::timed`].
+    pub stats: Stats,
+}
+
+/// Renders `world`. `progress` is told how many of how many frames are done.
+///
+/// # Errors
+/// [`crate::offline::Error`] of the settings, the device or the driver.
+pub fn render(world: &World, settings: &Settings, progress: &mut dyn FnMut(u32, u32)) -> Result<Rendered> {
+    let config = settings.config();
+    config.validate()?;
+    let headless = Headless::new(&settings.device, &Requirements::of(&config))?;
+    let mut session = Session::new(headless, world, &config)?;
+    let chunks = settings.reference.map_or(1, |n| n.div_ceil(config.directions));
+    let total = chunks + if settings.timed { WARM_UP + TIMED } else { 0 };
+
+    let mut sum: Vec<f64> = Vec::new();
+    for chunk in 0..chunks {
+        session.frame([settings.seed, chunk])?;
+        let (bytes, ..) = session.image("resolved")?;
+        let values: Vec<f32> = bytemuck::pod_collect_to_vec(&bytes);
+        sum.resize(values.len(), 0.0);
+        sum.iter_mut().zip(&values).for_each(|(s, v)| *s += f64::from(*v));
+        progress(chunk + 1, total);
+    }
+    let channel = |c: usize| sum.iter().skip(c).step_by(4).map(|s| (s / f64::from(chunks)) as f32).collect();
+    let [width, height] = settings.extent;
+    let mut channels: Vec<_> = ["R", "G", "B", "A"].iter().enumerate().map(|(c, n)| (n.to_string(), channel(c))).collect();
+    for aov in &settings.aovs {
+        channels.extend(aov.read(&mut session, settings.samples_per_side, config.directions)?);
+    }
+
+    // A frame's times arrive when its slot is recorded again.
+    let mut timings: Vec<FrameTimings> = Vec::new();
+    for frame in 0..if settings.timed { WARM_UP + TIMED } else { 0 } {
+        session.frame([settings.seed, 0])?;
+        if frame >= WARM_UP {
+            timings.extend(session.timings().cloned());
+        }
+        progress(chunks + frame + 1, total);
+    }
+    let stats = statistics(world, settings, &config, &mut session, &timings)?;
+    Ok(Rendered { image: LinearImage { width, height, channels }, stats })
+}
+
+fn statistics(
+    world: &World,
+    settings: &Settings,
+    config: &Config,
+    session: &mut Session,
+    timings: &[FrameTimings],
+) -> Result<Stats> {
+    let shaded = u64::from(session.shaded()?);
+    let taken = shaded * u64::from(config.directions);
+    let estimator = match config.estimator {
+        Estimator::Mis => "mis",
+        Estimator::Brdf => "brdf",
+        Estimator::BrdfRandom => "brdf-random",
+    };
+    let values = BTreeMap::from([
+        ("rate", json!("full")),
+        ("filter", json!("point")),
+        ("estimator", json!(estimator)),
+        ("samples", json!(config.directions)),
+        ("aa", json!(config.samples_per_side.pow(2))),
+        ("seed", json!(settings.seed)),
+        ("reference", json!(settings.reference)),
+    ]);
+    Ok(Stats {
+        schema: 1,
+        device: session.headless().info().clone(),
+        scene: world.name.clone(),
+        extent: settings.extent,
+        settings: values,
+        pixels: Pixels { covered: shaded, shaded, by_level: BTreeMap::from([(0, shaded)]) },
+        samples: Samples { taken, budget: taken },
+        passes: pass_times(timings, session.pass_bytes()),
+        frame_ms: Quantiles::of(timings.iter().map(|t| t.span_ms).collect()),
+        setup_ms: session.setup().iter().copied().collect(),
+        memory_bytes: session.headless().peak_bytes(),
+        validation_messages: session.messages(),
+    })
+}
