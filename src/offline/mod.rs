@@ -3,4 +3,5 @@
 
 pub mod error;
 pub mod mesh;
+pub mod reference;
 pub mod world;
