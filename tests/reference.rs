@@ -84,7 +84,13 @@ fn sun_sky(width: u32, height: u32) -> LatLong {
         let w = latlong::direction(DVec2::new(f64::from(x) + 0.5, f64::from(y) + 0.5) / DVec2::new(width.into(), height.into()));
         let sky = DVec3::new(0.3, 0.5, 1.0) * (0.4 + 0.6 * w.y.max(0.0)) + 0.2 * w.x;
         let in_sun = x.abs_diff(sun[0]) < 2 && x >= sun[0] && y.abs_diff(sun[1]) < 2 && y >= sun[1];
-        if in_sun { DVec3::new(900.0, 800.0, 600.0) } else if w.y > 0.0 { sky.max(DVec3::ZERO) } else { DVec3::splat(0.08) }
+        if in_sun {
+            DVec3::new(900.0, 800.0, 600.0)
+        } else if w.y > 0.0 {
+            sky.max(DVec3::ZERO)
+        } else {
+            DVec3::splat(0.08)
+        }
     })
 }
 
@@ -180,13 +186,16 @@ fn lambert_in_a_furnace_returns_one() {
 #[test]
 fn broad_lobes_agree_with_brute_force() {
     for map in [sun_sky(64, 32), noise(64, 32)] {
-        let world = World { environment: Some(EnvironmentLight { rotation: 37.0, ..world(map).environment.unwrap() }), ..world(constant()) };
+        let world = World {
+            environment: Some(EnvironmentLight { rotation: 37.0, ..world(map).environment.unwrap() }),
+            ..world(constant())
+        };
         let metal = Metal { alpha: 0.5 };
         for reflectance in [&Lambert as &dyn Reflectance, &metal] {
             let image = render(&world, reflectance, 16, Options::default());
             for i in some_pixels(&image, 8) {
                 let hit = image.hits[i].unwrap();
-                let truth = brute_force(&world, reflectance, hit.normal, hit.view, 16);
+                let truth = brute_force(&world, reflectance, hit.normal, hit.view, 8);
                 let off = relative(image.radiance[i], truth);
                 assert!(off < 1e-3, "pixel {i}, cosine {}: {} for {truth}: {off:e}", hit.normal.dot(hit.view), image.radiance[i]);
             }
@@ -196,15 +205,38 @@ fn broad_lobes_agree_with_brute_force() {
 
 #[test]
 fn mirror_like_lobes_agree_with_a_half_vector_rule() {
+    let world = world(noise(128, 64));
+    let metal = Metal { alpha: 0.03 };
+    let image = render(&world, &metal, 32, Options::default());
+    let mut checked = 0;
+    for i in some_pixels(&image, 12) {
+        let hit = image.hits[i].unwrap();
+        let [coarse, truth] = [500, 1000].map(|steps| half_vector_rule(&world, &metal, hit.normal, hit.view, steps));
+        // At grazing views the horizon cuts the lobe and this rule converges slowly: what it does not know is no error.
+        let unknown = relative(coarse, truth);
+        if unknown < 1e-3 {
+            checked += 1;
+            let off = relative(image.radiance[i], truth);
+            let cosine = hit.normal.dot(hit.view);
+            assert!(off < 1e-3 + unknown, "pixel {i}, cosine {cosine}: {} for {truth}: {off:e}", image.radiance[i]);
+        }
+    }
+    assert!(checked >= 5, "only {checked} pixels were checked");
+}
+
+#[test]
+fn mirror_like_lobes_agree_with_brute_force() {
     for map in [sun_sky(128, 64), noise(128, 64)] {
         let world = world(map);
         let metal = Metal { alpha: 0.03 };
         let image = render(&world, &metal, 32, Options::default());
-        for i in some_pixels(&image, 12) {
+        let cosine = |i: usize| image.hits[i].map_or(0.0, |hit| hit.normal.dot(hit.view));
+        // Grazing, oblique and frontal views: the first is where a mirror's lobe is narrowest.
+        for range in [0.02..0.06, 0.2..0.4, 0.9..1.0] {
+            let i = (0..image.hits.len()).find(|i| range.contains(&cosine(*i))).unwrap();
             let hit = image.hits[i].unwrap();
-            let truth = half_vector_rule(&world, &metal, hit.normal, hit.view, 1500);
-            let off = relative(image.radiance[i], truth);
-            assert!(off < 1e-3, "pixel {i}, cosine {}: {} for {truth}: {off:e}", hit.normal.dot(hit.view), image.radiance[i]);
+            let off = relative(image.radiance[i], brute_force(&world, &metal, hit.normal, hit.view, 48));
+            assert!(off < 1e-3, "pixel {i}, cosine {}: {off:e}", cosine(i));
         }
     }
 }
@@ -212,13 +244,17 @@ fn mirror_like_lobes_agree_with_a_half_vector_rule() {
 #[test]
 fn a_tighter_tolerance_stays_within_the_reported_error() {
     let world = world(noise(64, 32));
-    for alpha in [0.01, 0.1, 0.4] {
+    for alpha in [0.003, 0.03, 0.4] {
         let metal = Metal { alpha };
         let loose = render(&world, &metal, 16, Options { tolerance: 1e-2, ..Options::default() });
         let tight = render(&world, &metal, 16, Options { tolerance: 1e-5, ..Options::default() });
         for i in some_pixels(&loose, 40) {
             let off = relative(loose.radiance[i], tight.radiance[i]);
-            assert!(loose.error[i] <= 1e-2 && off <= loose.error[i].max(1e-4), "pixel {i}: {off:e}, reported {:e}", loose.error[i]);
+            assert!(
+                loose.error[i] <= 1e-2 && off <= loose.error[i].max(1e-4),
+                "pixel {i}: {off:e}, reported {:e}",
+                loose.error[i]
+            );
         }
     }
 }
@@ -340,14 +376,17 @@ fn timings() {
         let mut line = format!("{name}:");
         let _ = Reference::with_reflectances(&world, [64, 64], Options::default(), vec![&Lambert]).unwrap();
         line += &format!(" setup {:.3} s;", start.elapsed().as_secs_f64());
-        for alpha in [0.003, 0.03, 0.1, 0.5] {
+        for alpha in [0.003, 0.03, 0.5] {
             let start = Instant::now();
             let metal = Metal { alpha };
             let image = render(&world, &metal, 64, Options::default());
             let pixels = image.coverage.iter().filter(|c| **c).count();
             let worst = image.error.iter().fold(0.0, |a: f64, b| a.max(*b));
             let mean = image.evaluations as f64 / pixels as f64;
-            line += &format!(" alpha {alpha}: {:.2} s, {pixels} px, {mean:.0} evaluations, worst {worst:.1e};", start.elapsed().as_secs_f64());
+            line += &format!(
+                " alpha {alpha}: {:.2} s, {pixels} px, {mean:.0} evaluations, worst {worst:.1e};",
+                start.elapsed().as_secs_f64()
+            );
         }
         println!("{line}");
     }

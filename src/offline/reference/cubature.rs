@@ -4,6 +4,7 @@ use crate::offline::reference::environment::{Parts, Region, Tree};
 use crate::reflectance::Reflectance;
 use glam::DVec3;
 use std::collections::BinaryHeap;
+use std::f64::consts::FRAC_PI_2;
 
 /// When a pixel is done.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -33,6 +34,9 @@ pub struct Estimate {
 
 /// Seeds are at most this large (radians).
 const COARSEST: f64 = 0.4;
+/// Seeds across the horizon are at most this many times the root of the tolerance in radius: a corner of the cosine that lies
+/// between all quadrature points costs a share of the radius squared, and halving does not reveal it.
+const HORIZON: f64 = 6.0;
 /// Channels below this share of the environment's mean radiance need not converge: they are black.
 const BLACK: f64 = 1e-9;
 
@@ -121,11 +125,11 @@ pub fn integrate(tree: &Tree, normal: DVec3, view: DVec3, reflectance: &dyn Refl
     let mut lobe = Lobe { tangent, bitangent, normal, view, reflectance };
     lobe.view = lobe.local(view);
     let mirror = (normal * (2.0 * normal.dot(view)) - view).normalize();
-    let seeds = seeds(tree, normal, mirror, lobe.width(mirror));
+    let seeds = seeds(tree, normal, mirror, lobe.width(mirror), HORIZON * options.tolerance.max(0.0).sqrt());
 
     let above = |region: Region| {
         let (axis, radius) = tree.cone(region);
-        radius >= std::f64::consts::FRAC_PI_2 || axis.dot(normal) > -radius.sin()
+        radius >= FRAC_PI_2 || axis.dot(normal) > -radius.sin()
     };
     let mut evaluations = 0;
     let mut value = |region: Region| {
@@ -180,15 +184,17 @@ pub fn integrate(tree: &Tree, normal: DVec3, view: DVec3, reflectance: &dyn Refl
 
 /// The regions to start from: at most [`COARSEST`] in radius, shrinking towards the mirror direction down to `finest`, so
 /// that no lobe hides between quadrature points. What lies below the horizon is left out.
-fn seeds(tree: &Tree, normal: DVec3, mirror: DVec3, finest: f64) -> Vec<Region> {
+fn seeds(tree: &Tree, normal: DVec3, mirror: DVec3, finest: f64, horizon: f64) -> Vec<Region> {
     let (mut stack, mut seeds) = (vec![tree.root()], Vec::new());
     while let Some(region) = stack.pop() {
         let (axis, radius) = tree.cone(region);
-        if radius < std::f64::consts::FRAC_PI_2 && axis.dot(normal) <= -radius.sin() {
+        if radius < FRAC_PI_2 && axis.dot(normal) <= -radius.sin() {
             continue;
         }
         let distance = axis.angle_between(mirror);
-        if radius > (0.8 * distance).max(finest).min(COARSEST) {
+        let across = axis.dot(normal) < radius.sin() || radius >= FRAC_PI_2;
+        let most = if across { horizon.min(COARSEST) } else { COARSEST };
+        if radius > (0.8 * distance).max(finest).min(most) {
             stack.extend_from_slice(tree.split(region).as_slice());
         } else {
             seeds.push(region);

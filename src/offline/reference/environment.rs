@@ -267,9 +267,5 @@ fn edges(edges: impl Iterator<Item = f64>, step: f64) -> Vec<f64> {
 /// The three Lagrange polynomials of the Gauss points at `x` in [0, 1].
 fn lagrange(x: f64) -> [f64; SIDE] {
     let [a, b, c] = NODES;
-    [
-        (x - b) * (x - c) / ((a - b) * (a - c)),
-        (x - a) * (x - c) / ((b - a) * (b - c)),
-        (x - a) * (x - b) / ((c - a) * (c - b)),
-    ]
+    [(x - b) * (x - c) / ((a - b) * (a - c)), (x - a) * (x - c) / ((b - a) * (b - c)), (x - a) * (x - b) / ((c - a) * (c - b))]
 }

@@ -148,7 +148,8 @@ impl ReferenceImage {
     /// see the same surface. Pixels on the image's edge are not interior.
     pub fn interior(&self) -> Vec<bool> {
         let [w, h] = self.extent.map(i64::from);
-        let hit = |x: i64, y: i64| if x < 0 || y < 0 || x >= w || y >= h { None } else { *self.hits.get((y * w + x) as usize)? };
+        let hit =
+            |x: i64, y: i64| if x < 0 || y < 0 || x >= w || y >= h { None } else { *self.hits.get((y * w + x) as usize)? };
         let interior = |x: i64, y: i64| {
             let Some(centre) = hit(x, y) else { return false };
             let same = |n: Hit| n.object == centre.object && (n.depth - centre.depth).abs() < INTERIOR_STEP * centre.depth;

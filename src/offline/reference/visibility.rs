@@ -29,7 +29,9 @@ pub fn bend(normal: DVec3, view: DVec3) -> DVec3 {
     if cosine >= MIN_COSINE {
         return normal;
     }
-    let aside = (normal - view * cosine).try_normalize().unwrap_or_else(|| view.any_orthonormal_vector());
+    let aside = normal - view * cosine;
+    // Exactly opposite normals have no direction to bend along; any will do.
+    let aside = if aside.length() > 1e-9 { aside.normalize() } else { view.any_orthonormal_vector() };
     view * MIN_COSINE + aside * (1.0 - MIN_COSINE * MIN_COSINE).sqrt()
 }
 
@@ -66,7 +68,8 @@ pub fn trace(world: &World, extent: [u32; 2]) -> Result<Vec<Option<Hit>>> {
             return Err(Error::invalid(format!("objects[{index}].material"), expected, object.material));
         }
         let transform = object.transform();
-        let points: Vec<DVec3> = object.mesh.positions.iter().map(|p| transform.transform_point3(p.map(f64::from).into())).collect();
+        let points: Vec<DVec3> =
+            object.mesh.positions.iter().map(|p| transform.transform_point3(p.map(f64::from).into())).collect();
         for triangle in object.mesh.indices.chunks_exact(3) {
             let mut corners = [0; 3];
             let mut at = [DVec3::ZERO; 3];
