@@ -3,5 +3,6 @@
 
 pub mod error;
 pub mod mesh;
+pub mod metrics;
 pub mod reference;
 pub mod world;

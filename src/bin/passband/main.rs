@@ -1,2 +1,48 @@
-//! The `passband` command.
-fn main() {}
+//! The `passband` command: one file a subcommand.
+
+mod compare;
+
+use clap::{Parser, Subcommand};
+use std::process::ExitCode;
+
+/// Shades as often as the light field needs.
+#[derive(Parser)]
+#[command(name = "passband", version)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    Compare(compare::Args),
+}
+
+fn main() -> ExitCode {
+    let cli = match Cli::try_parse() {
+        Ok(cli) => cli,
+        Err(error) => return usage(&error),
+    };
+    let result = match &cli.command {
+        Command::Compare(args) => compare::run(args),
+    };
+    // The one place where errors become exit codes: 2 for what was asked, 3 for the device.
+    result.unwrap_or_else(|error| {
+        eprintln!("passband: {error}");
+        ExitCode::from(error.exit_code())
+    })
+}
+
+/// Help and version go to standard output; a wrong argument is one line and exit code 2.
+fn usage(error: &clap::Error) -> ExitCode {
+    if !error.use_stderr() {
+        // A closed pipe is no failure of ours.
+        let _ = error.print();
+        return ExitCode::SUCCESS;
+    }
+    let text = error.render().to_string();
+    let what = text.split("\n\nUsage:").next().unwrap_or_default().trim_start_matches("error: ");
+    let what = what.split_whitespace().collect::<Vec<_>>().join(" ");
+    eprintln!("passband: {what}");
+    ExitCode::from(2)
+}
