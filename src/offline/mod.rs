@@ -9,6 +9,8 @@ pub mod headless;
 pub mod image_io;
 mod input;
 pub mod mesh;
+pub mod metrics;
+pub mod reference;
 pub mod render;
 pub mod scene;
 pub mod session;

@@ -1,0 +1,183 @@
+//! Which surface each pixel centre sees, by f64 ray-triangle intersection.
+
+use crate::error::{Error, Result};
+use crate::offline::world::{Object, World};
+use glam::{DMat3, DVec2, DVec3};
+
+/// Normals are bent so that their cosine with the view direction is at least this.
+pub const MIN_COSINE: f64 = 0.02;
+
+/// What a pixel centre sees.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Hit {
+    /// Index into [`World::objects`].
+    pub object: usize,
+    /// Index into [`World::materials`].
+    pub material: usize,
+    /// Unit shading normal in world space, bent towards the viewer ([`bend`]).
+    pub normal: DVec3,
+    /// Unit direction to the viewer in world space.
+    pub view: DVec3,
+    /// Distance along the view axis in metres.
+    pub depth: f64,
+}
+
+/// Turns a unit normal that faces away from unit `view` (cosine below [`MIN_COSINE`] = c) towards it until the cosine is c:
+/// `n' = c v + sqrt(1 - c^2) t`, where `t` is the normalised part of `n` perpendicular to `v`.
+pub fn bend(normal: DVec3, view: DVec3) -> DVec3 {
+    let cosine = normal.dot(view);
+    if cosine >= MIN_COSINE {
+        return normal;
+    }
+    let aside = normal - view * cosine;
+    // Exactly opposite normals have no direction to bend along; any will do.
+    let aside = if aside.length() > 1e-9 { aside.normalize() } else { view.any_orthonormal_vector() };
+    view * MIN_COSINE + aside * (1.0 - MIN_COSINE * MIN_COSINE).sqrt()
+}
+
+/// The nearest triangle of a pixel so far.
+#[derive(Clone, Copy)]
+struct Nearest {
+    distance: f64,
+    object: usize,
+    corners: [usize; 3],
+    weights: DVec3,
+}
+
+/// Row-major hits through the pixel centres of an image of `extent` pixels. Triangles are two-sided. Each triangle is
+/// intersected with the rays of its projected bounding box, so that the cost is linear in triangles and covered pixels.
+///
+/// # Errors
+/// [`Error::InvalidInput`] for an empty extent, a camera without a direction, or an index out of range.
+pub fn trace(world: &World, extent: [u32; 2]) -> Result<Vec<Option<Hit>>> {
+    let [width, height] = extent.map(|n| n as usize);
+    if width == 0 || height == 0 {
+        return Err(Error::invalid("extent", "at least 1x1", format!("{width}x{height}")));
+    }
+    let axes = world.camera.world_from_view();
+    if !axes.is_finite() {
+        return Err(Error::invalid("camera", "a target off the position and an up off the view direction", "neither"));
+    }
+    let centre = |i: usize| DVec2::new((i % width) as f64 + 0.5, (i / width) as f64 + 0.5);
+    let rays: Vec<DVec3> = (0..width * height).map(|i| world.camera.ray(centre(i), extent)).collect();
+    let mut nearest: Vec<Option<Nearest>> = vec![None; rays.len()];
+    let screen = Screen::new(world, extent);
+    for (index, object) in world.objects.iter().enumerate() {
+        if object.material >= world.materials.len() {
+            let expected = format!("a material below {}", world.materials.len());
+            return Err(Error::invalid(format!("objects[{index}].material"), expected, object.material));
+        }
+        let transform = object.transform();
+        let points: Vec<DVec3> =
+            object.mesh.positions.iter().map(|p| transform.transform_point3(p.map(f64::from).into())).collect();
+        for triangle in object.mesh.indices.chunks_exact(3) {
+            let mut corners = [0; 3];
+            let mut at = [DVec3::ZERO; 3];
+            for ((corner, at), id) in corners.iter_mut().zip(&mut at).zip(triangle) {
+                *corner = *id as usize;
+                *at = *points.get(*corner).ok_or_else(|| {
+                    Error::invalid(format!("objects[{index}].mesh.indices"), format!("below {}", points.len()), id)
+                })?;
+            }
+            let Some([x, y]) = screen.bounds(at) else { continue };
+            for row in y[0]..y[1] {
+                for i in row * width + x[0]..row * width + x[1] {
+                    let (Some(ray), Some(pixel)) = (rays.get(i), nearest.get_mut(i)) else { continue };
+                    let Some((distance, weights)) = intersect(world.camera.position, *ray, at) else { continue };
+                    if pixel.is_none_or(|found| distance < found.distance) {
+                        *pixel = Some(Nearest { distance, object: index, corners, weights });
+                    }
+                }
+            }
+        }
+    }
+    let hits = rays.iter().zip(nearest).map(|(ray, found)| {
+        let found = found?;
+        let object = world.objects.get(found.object)?;
+        let depth = -found.distance * ray.dot(axes.z_axis);
+        Some(Hit {
+            object: found.object,
+            material: object.material,
+            normal: bend(shading_normal(object, &found), -*ray),
+            view: -*ray,
+            depth,
+        })
+    });
+    Ok(hits.collect())
+}
+
+/// Interpolates in object space, transforms by the inverse transpose and normalises; the triangle's own normal where the
+/// interpolated one vanishes.
+fn shading_normal(object: &Object, found: &Nearest) -> DVec3 {
+    let mesh = &object.mesh;
+    let get = |list: &[[f32; 3]], i: usize| list.get(i).map_or(DVec3::ZERO, |p| DVec3::from(p.map(f64::from)));
+    let [a, b, c] = found.corners;
+    let w = found.weights;
+    let smooth = get(&mesh.normals, a) * w.x + get(&mesh.normals, b) * w.y + get(&mesh.normals, c) * w.z;
+    let linear = DMat3::from_mat4(object.transform());
+    // The inverse transpose up to a positive factor, defined for singular matrices too.
+    let (x, y, z) = (linear.x_axis, linear.y_axis, linear.z_axis);
+    let sign = if linear.determinant() < 0.0 { -1.0 } else { 1.0 };
+    let cofactor = DMat3::from_cols(y.cross(z), z.cross(x), x.cross(y)) * sign;
+    let flat = || {
+        let [a, b, c] = [a, b, c].map(|i| get(&mesh.positions, i));
+        (cofactor * (b - a).cross(c - a)).try_normalize()
+    };
+    (cofactor * smooth).try_normalize().or_else(flat).unwrap_or(DVec3::Y)
+}
+
+/// Distance along the unit ray and barycentric coordinates (Moller and Trumbore 1997); edges belong to the triangle.
+fn intersect(origin: DVec3, ray: DVec3, [a, b, c]: [DVec3; 3]) -> Option<(f64, DVec3)> {
+    let (ab, ac) = (b - a, c - a);
+    let p = ray.cross(ac);
+    let det = ab.dot(p);
+    if det == 0.0 {
+        return None;
+    }
+    let s = origin - a;
+    let q = s.cross(ab);
+    let (u, v, distance) = (s.dot(p) / det, ray.dot(q) / det, ac.dot(q) / det);
+    (u >= 0.0 && v >= 0.0 && u + v <= 1.0 && distance > 0.0).then(|| (distance, DVec3::new(1.0 - u - v, u, v)))
+}
+
+/// Projection to pixels, for bounding boxes only.
+struct Screen {
+    eye: DVec3,
+    view_from_world: DMat3,
+    half: DVec2,
+    pixels_per_tangent: f64,
+    extent: [u32; 2],
+}
+
+impl Screen {
+    fn new(world: &World, extent: [u32; 2]) -> Self {
+        let half = DVec2::from(extent.map(f64::from)) / 2.0;
+        Self {
+            eye: world.camera.position,
+            view_from_world: world.camera.world_from_view().transpose(),
+            half,
+            pixels_per_tangent: half.y / (world.camera.fov_y.to_radians() / 2.0).tan(),
+            extent,
+        }
+    }
+
+    /// Half-open pixel ranges in x and y whose centres the triangle may cover; all of the image if it reaches behind the eye.
+    fn bounds(&self, triangle: [DVec3; 3]) -> Option<[[usize; 2]; 2]> {
+        let view = triangle.map(|p| self.view_from_world * (p - self.eye));
+        if view.iter().all(|p| p.z >= 0.0) {
+            return None;
+        }
+        if view.iter().any(|p| p.z >= -1e-9) {
+            return Some(self.extent.map(|n| [0, n as usize]));
+        }
+        let pixels = view.map(|p| self.half + DVec2::new(p.x, -p.y) * (self.pixels_per_tangent / -p.z));
+        // A hair wider than exact: the intersection test decides.
+        let low = pixels.into_iter().fold(DVec2::INFINITY, DVec2::min) - (0.5 + 1e-6);
+        let high = pixels.into_iter().fold(DVec2::NEG_INFINITY, DVec2::max) - (0.5 - 1e-6);
+        // Casts saturate, so that what lies off the image ends as an empty range.
+        let range = |low: f64, high: f64, n: u32| [low.ceil().max(0.0) as usize, ((high.floor() + 1.0) as usize).min(n as usize)];
+        let [w, h] = self.extent;
+        let (x, y) = (range(low.x, high.x, w), range(low.y, high.y, h));
+        (x[0] < x[1] && y[0] < y[1]).then_some([x, y])
+    }
+}
