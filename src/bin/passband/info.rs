@@ -27,10 +27,8 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         let devices: Vec<_> = devices
             .iter()
             .map(|(info, rows)| {
-                let rows: Vec<_> = rows
-                    .iter()
-                    .map(|r| json!({ "name": r.name, "needed": r.needed, "found": r.found, "ok": r.ok }))
-                    .collect();
+                let rows: Vec<_> =
+                    rows.iter().map(|r| json!({ "name": r.name, "needed": r.needed, "found": r.found, "ok": r.ok })).collect();
                 json!({ "device": info, "suitable": rows.iter().all(|r| r["ok"] == true), "requirements": rows })
             })
             .collect();
@@ -42,7 +40,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     for (index, (info, rows)) in devices.iter().enumerate() {
         println!("{index}: {} ({}; Vulkan {}; {})", info.name, info.kind, info.api, info.driver);
         let mut table = Table::new();
-        table.load_preset(presets::NOTHING).set_header(["", "requirement", "needed", "found"]);
+        table.load_style(presets::NOTHING).set_header(["", "requirement", "needed", "found"]);
         for row in rows {
             table.add_row([if row.ok { "ok" } else { "MISSING" }, &row.name, &row.needed, &row.found]);
         }

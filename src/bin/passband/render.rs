@@ -3,7 +3,6 @@
 use clap::ValueEnum;
 use indicatif::{ProgressBar, ProgressStyle};
 use passband::Estimator;
-use passband::offline::aov::Aov;
 use passband::offline::error::{Error, Result};
 use passband::offline::headless::Options;
 use passband::offline::image_io::{LinearImage, write_atomically, write_image};
@@ -100,8 +99,25 @@ enum Method {
 }
 
 const FILTERS: [&str; 19] = [
-    "point", "naive", "fixed", "toksvig", "toksvig-lobe", "lean", "lean-lobe", "leadr", "tk", "fournier4", "fournier7", "gmm",
-    "gmm-unaligned", "vmf1", "vmf4", "vmf8", "vmf", "clusters", "bruteforce",
+    "point",
+    "naive",
+    "fixed",
+    "toksvig",
+    "toksvig-lobe",
+    "lean",
+    "lean-lobe",
+    "leadr",
+    "tk",
+    "fournier4",
+    "fournier7",
+    "gmm",
+    "gmm-unaligned",
+    "vmf1",
+    "vmf4",
+    "vmf8",
+    "vmf",
+    "clusters",
+    "bruteforce",
 ];
 
 fn size(text: &str) -> std::result::Result<[u32; 2], String> {
@@ -193,11 +209,12 @@ pub fn run(args: &Args) -> Result<ExitCode> {
 fn display(image: &LinearImage) -> Vec<u8> {
     let (Some(rgb), Some(coverage)) = (image.rgb(), image.channel("A")) else { return Vec::new() };
     let covered = rgb.iter().zip(coverage).filter(|(_, a)| **a > 0.0);
-    let (sum, count) = covered.fold((0.0, 0u64), |(sum, n), (&[r, g, b], _)| {
-        (sum + luminance(glam::Vec3::new(r, g, b).as_dvec3()), n + 1)
-    });
+    let (sum, count) =
+        covered.fold((0.0, 0u64), |(sum, n), (&[r, g, b], _)| (sum + luminance(glam::Vec3::new(r, g, b).as_dvec3()), n + 1));
     let exposure = Exposure::Auto.factor(sum / count.max(1) as f64);
     let byte = |linear: f64| (encode(linear.clamp(0.0, 1.0)) * 255.0).round() as u8;
-    let opaque = |&[r, g, b]: &[f32; 3]| [byte(f64::from(r) * exposure), byte(f64::from(g) * exposure), byte(f64::from(b) * exposure), 255];
+    let opaque = |&[r, g, b]: &[f32; 3]| {
+        [byte(f64::from(r) * exposure), byte(f64::from(g) * exposure), byte(f64::from(b) * exposure), 255]
+    };
     rgb.iter().flat_map(opaque).collect()
 }

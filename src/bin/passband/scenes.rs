@@ -13,7 +13,7 @@ pub struct Args {}
 /// Runs the subcommand.
 pub fn run(_: &Args) -> Result<ExitCode> {
     let mut table = Table::new();
-    table.load_preset(presets::NOTHING);
+    table.load_style(presets::NOTHING);
     for (name, description) in Scene::builtin_names() {
         table.add_row([name, description]);
     }
