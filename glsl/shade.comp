@@ -14,6 +14,7 @@ layout(constant_id = 0) const uint ESTIMATOR = 0u;
 const uint ESTIMATOR_MIS = 0u;
 const uint ESTIMATOR_BRDF = 1u;
 const uint ESTIMATOR_BRDF_RANDOM = 2u;
+const uint ESTIMATOR_LOOKUP = 3u;
 
 layout(set = 2, binding = 3, std430) readonly buffer Arguments {
     uint groups_x, groups_y, groups_z;
@@ -95,6 +96,13 @@ vec3 environment_direction(Local f, Material m, uvec2 u) {
     return value / (brdf + float(push.environment_samples) * s.density);
 }
 
+// Reflectance and radiance in an arbitrary direction: no estimate, but the look-ups that every estimate is made of.
+vec3 lookup(Local f, Material m, uint u) {
+    vec3 wi = normalize(vec3(uvec3(u, u >> 10, u >> 20) & 1023u) - 511.25);
+    wi.z = abs(wi.z);
+    return material_evaluate(m, wi, f.view, normalize(wi + f.view)) * environment_lookup(to_world(f, wi)).rgb;
+}
+
 void main() {
     uint index = list_index();
     if (index >= arguments.count) {
@@ -107,6 +115,13 @@ void main() {
 
     uint seed = hash(entry ^ hash(frame.sampling.x ^ hash(frame.sampling.y)));
     vec3 sum = vec3(0.0);
+    if (ESTIMATOR == ESTIMATOR_LOOKUP) {
+        for (uint i = 0u; i < push.brdf_samples; ++i) {
+            sum += lookup(f, m, hash(seed + i));
+        }
+        imageStore(radiance, p, vec4(sum, 1.0));
+        return;
+    }
     uvec2 seeds = sobol_seeds(seed);
     for (uint i = 0u; i < push.brdf_samples; ++i) {
         sum += brdf_direction(f, m, ESTIMATOR == ESTIMATOR_BRDF_RANDOM ? random_point(i, seed) : sobol_point(i, seeds));

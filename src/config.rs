@@ -14,6 +14,9 @@ pub enum Estimator {
     Brdf,
     /// Reflectance importance sampling with independent random points (Bagher 2011, section 3.3).
     BrdfRandom,
+    /// No estimate: reflectance and radiance looked up in hashed directions and summed. Its time is the least that any
+    /// estimator with as many directions can take on a device.
+    Lookup,
 }
 
 /// Where the G-buffer comes from.

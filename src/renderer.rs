@@ -362,6 +362,39 @@ impl Renderer {
         &self.targets.arguments
     }
 
+    /// Records a [`probe`](crate::pass::probe) module over the current materials and environment, at this frame's environment use.
+    #[cfg(feature = "offline")]
+    pub(crate) fn record_probe(
+        &mut self,
+        cmd: vk::CommandBuffer,
+        inputs: &FrameInputs<'_>,
+        probe: &crate::pass::probe::Probe,
+        (input, count, output): (&Buffer, u32, &Buffer),
+    ) -> Result<()> {
+        let (Some(environment), Some(materials)) = (&self.environment, &self.materials) else {
+            return Err(Error::CallOrder { called: "record_probe", before: "record_environment and record_materials" });
+        };
+        let uniform = frame_uniform(&self.config, self.targets.plan.shading, inputs);
+        self.uniforms[inputs.slot].bytes_mut().copy_from_slice(bytemuck::bytes_of(&uniform));
+        let rec = &mut Recorder::new(&self.cx, cmd, inputs.slot, &mut self.states, None);
+        let bridge = BridgeSets { materials: self.bridge.write(rec, materials, &self.samplers), ..BridgeSets::NONE };
+        let (frame, samplers) = (&self.uniforms[inputs.slot], &self.samplers);
+        probe.record(rec, &crate::pass::probe::Io { frame, bridge, samplers, environment, materials, input, count, output });
+        Ok(())
+    }
+
+    /// Forgets a buffer that is about to be destroyed.
+    #[cfg(feature = "offline")]
+    pub(crate) fn forget(&mut self, buffer: &Buffer) {
+        self.states.forget(buffer.handle);
+    }
+
+    /// Layout of set 1.
+    #[cfg(feature = "offline")]
+    pub(crate) fn material_layout(&self) -> vk::DescriptorSetLayout {
+        self.bridge.layout
+    }
+
     #[cfg(feature = "offline")]
     pub(crate) fn context(&self) -> &Context {
         &self.cx

@@ -117,6 +117,7 @@ fn statistics(
         Estimator::Mis => "mis",
         Estimator::Brdf => "brdf",
         Estimator::BrdfRandom => "brdf-random",
+        Estimator::Lookup => "lookup",
     };
     let values = BTreeMap::from([
         ("rate", json!("full")),

@@ -4,6 +4,7 @@ use crate::gpu::access::Access;
 use crate::gpu::buffer::Buffer;
 use crate::gpu::image::Image;
 use crate::gpu::memory::Location;
+use crate::gpu::pipeline::{BridgeLayouts, Modules};
 use crate::gpu::recorder::{Recorder, States};
 use crate::gpu::retire::{Build, Retired};
 use crate::gpu::timer::FrameTimings;
@@ -12,6 +13,9 @@ use crate::offline::error::{Error, Result};
 use crate::offline::headless::Headless;
 use crate::offline::mesh::Mesh;
 use crate::offline::world::{Camera, World};
+use crate::pass::PassContext;
+use crate::pass::probe::Probe;
+use crate::plan::ARGUMENT_BYTES;
 use crate::renderer::{EnvironmentUse, FrameInputs, GBufferInput, Renderer};
 use crate::sampling::LatLong;
 use crate::{Config, Draw, View};
@@ -149,20 +153,59 @@ impl Session {
     /// # Errors
     /// The library's or the device's.
     pub fn frame(&mut self, seed: [u32; 2]) -> Result<()> {
+        let inputs = inputs(self.view, &self.draws, self.environment, seed);
         let renderer = self.renderer.as_mut().ok_or_else(closed)?;
-        let inputs = FrameInputs {
-            slot: 0,
-            view: self.view,
-            gbuffer: GBufferInput::Draws(&self.draws),
-            environment: self.environment,
-            seed,
-            output: None,
-        };
         self.headless.submit(|cmd, _| {
             // SAFETY: every submission is waited for, so slot 0 is always free; the buffers live as long as the session.
             unsafe { renderer.record(cmd, &inputs) }?;
             Ok(Retired::default())
         })
+    }
+
+    /// Runs a compute module of the caller's own over the session's materials and environment: local size 64, set 1 the
+    /// material bridge, set 2 the frame uniform, the environment's map and alias table, `uvec4` input and `vec4` output; a
+    /// push constant holds the number of entries. Entry i of the result is output i.
+    ///
+    /// # Errors
+    /// [`crate::Error::Shader`] for words that are no SPIR-V; the device's.
+    pub fn probe(&mut self, words: &[u32], input: &[[u32; 4]]) -> Result<Vec<[f32; 4]>> {
+        let inputs = inputs(self.view, &self.draws, self.environment, [0, 0]);
+        let renderer = self.renderer.as_mut().ok_or_else(closed)?;
+        let mut modules = Modules::default();
+        modules.replace("probe.comp", words.to_vec());
+        let mut made = None;
+        self.headless.submit(|cmd, memory| {
+            let bridge = BridgeLayouts { gbuffer: vk::DescriptorSetLayout::null(), materials: renderer.material_layout() };
+            let bytes: &[u8] = bytemuck::cast_slice(input);
+            let (probe, upload, output) = Build::run(renderer.context(), memory, |build| {
+                let usage = vk::BufferUsageFlags::STORAGE_BUFFER;
+                let upload = BufferUpload::new(build, "probe input", usage, bytes)?;
+                let source = usage | vk::BufferUsageFlags::TRANSFER_SRC;
+                let output = Buffer::new(build, "probe output", bytes.len() as u64, source, Location::Device)?;
+                Ok((Probe::new(&mut PassContext { build, modules: &modules, bridge, slots: 1 })?, upload, output))
+            })?;
+            let mut bag = Retired::default();
+            let mut fresh = None;
+            renderer.copy_out(cmd, |_, rec| fresh = Some(upload.record(rec, &mut bag)));
+            let input_buffer = fresh.ok_or_else(closed)?;
+            renderer.record_probe(cmd, &inputs, &probe, (&input_buffer, input.len() as u32, &output))?;
+            made = Some((probe, input_buffer, output));
+            Ok(bag)
+        })?;
+        let (probe, input_buffer, output) = made.ok_or_else(closed)?;
+        let result = self.read(output.size, |_, rec, target| copy_buffer(rec, &output, target));
+        let mut bag = Retired::default();
+        if let Some(renderer) = self.renderer.as_mut() {
+            renderer.forget(&input_buffer);
+            renderer.forget(&output);
+        }
+        probe.retire(&mut bag);
+        input_buffer.retire(&mut bag);
+        output.retire(&mut bag);
+        let (host, memory) = self.headless.parts()?;
+        // SAFETY: every submission was waited for.
+        unsafe { bag.free(host.device, memory) };
+        Ok(bytemuck::pod_collect_to_vec(&result?))
     }
 
     /// GPU times of the frame before the last.
@@ -190,7 +233,7 @@ impl Session {
     /// # Errors
     /// The device's.
     pub fn shaded(&mut self) -> Result<u32> {
-        let bytes = self.read(|renderer| Source::Buffer(renderer.arguments()))?;
+        let bytes = self.read(ARGUMENT_BYTES, |renderer, rec, target| copy_buffer(rec, renderer.arguments(), target))?;
         Ok(bytemuck::pod_collect_to_vec::<u8, u32>(&bytes).get(3).copied().unwrap_or(0))
     }
 
@@ -202,20 +245,29 @@ impl Session {
         let renderer = self.renderer.as_ref().ok_or_else(closed)?;
         let image = renderer.image(name).ok_or_else(|| Error::argument("image", "one that the frame writes", name))?;
         let (format, extent) = (image.desc.format, image.extent());
-        let name = image.desc.name;
-        let bytes = self.read(|renderer| renderer.image(name).map_or(Source::Nothing, Source::Image))?;
+        let (name, size) = (image.desc.name, image.desc.bytes());
+        let bytes = self.read(size, |renderer, rec, target| {
+            if let Some(image) = renderer.image(name) {
+                copy_image(rec, image, target);
+            }
+        })?;
         Ok((bytes, format, extent))
     }
 
-    fn read(&mut self, source: impl Fn(&Renderer) -> Source<'_>) -> Result<Vec<u8>> {
+    /// What `record` copies into a host-visible buffer of `size` bytes.
+    fn read(&mut self, size: u64, record: impl FnOnce(&Renderer, &mut Recorder<'_>, &Buffer)) -> Result<Vec<u8>> {
         let renderer = self.renderer.as_mut().ok_or_else(closed)?;
         let mut target = None;
         self.headless.submit(|cmd, memory| {
-            let size = source(renderer).bytes();
             let usage = vk::BufferUsageFlags::TRANSFER_DST;
             let buffer =
                 Build::run(renderer.context(), memory, |b| Buffer::new(b, "read-back", size, usage, Location::Readback))?;
-            renderer.copy_out(cmd, |r, rec| source(r).record(rec, &buffer));
+            renderer.copy_out(cmd, |renderer, rec| {
+                record(renderer, rec, &buffer);
+                rec.buffer(&buffer, Access::HOST_READ);
+                rec.flush();
+                rec.forget(buffer.handle);
+            });
             target = Some(buffer);
             Ok(Retired::default())
         })?;
@@ -250,58 +302,30 @@ impl Drop for Session {
     }
 }
 
-/// What can be copied to the host.
-enum Source<'a> {
-    Nothing,
-    Image(&'a Image),
-    Buffer(&'a Buffer),
+fn copy_image(rec: &mut Recorder<'_>, image: &Image, target: &Buffer) {
+    rec.image(image, Access::TRANSFER_READ);
+    rec.buffer(target, Access::TRANSFER_WRITE);
+    rec.flush();
+    let [width, height] = image.extent();
+    let layers = vk::ImageSubresourceLayers { aspect_mask: image.desc.aspect(), layer_count: 1, ..Default::default() };
+    let extent = vk::Extent3D { width, height, depth: 1 };
+    let region = vk::BufferImageCopy { image_subresource: layers, image_extent: extent, ..Default::default() };
+    let layout = Access::TRANSFER_READ.layout;
+    // SAFETY: the command buffer is recording; the buffer holds the whole image.
+    unsafe { rec.cx.device.cmd_copy_image_to_buffer(rec.cmd, image.handle, layout, target.handle, &[region]) };
 }
 
-impl Source<'_> {
-    fn bytes(&self) -> u64 {
-        match self {
-            Self::Nothing => 0,
-            Self::Image(image) => image.desc.bytes(),
-            Self::Buffer(buffer) => buffer.size,
-        }
-    }
+fn copy_buffer(rec: &mut Recorder<'_>, buffer: &Buffer, target: &Buffer) {
+    rec.buffer(buffer, Access::TRANSFER_READ);
+    rec.buffer(target, Access::TRANSFER_WRITE);
+    rec.flush();
+    let region = vk::BufferCopy { size: buffer.size, ..Default::default() };
+    // SAFETY: the command buffer is recording; both buffers have the source's size.
+    unsafe { rec.cx.device.cmd_copy_buffer(rec.cmd, buffer.handle, target.handle, &[region]) };
+}
 
-    fn record(&self, rec: &mut Recorder<'_>, target: &Buffer) {
-        match self {
-            Self::Nothing => {}
-            Self::Image(image) => {
-                rec.image(image, Access::TRANSFER_READ);
-                rec.buffer(target, Access::TRANSFER_WRITE);
-                rec.flush();
-                let [width, height] = image.extent();
-                let layers =
-                    vk::ImageSubresourceLayers { aspect_mask: image.desc.aspect(), layer_count: 1, ..Default::default() };
-                let extent = vk::Extent3D { width, height, depth: 1 };
-                let region = vk::BufferImageCopy { image_subresource: layers, image_extent: extent, ..Default::default() };
-                // SAFETY: the command buffer is recording; the buffer holds the whole image.
-                unsafe {
-                    rec.cx.device.cmd_copy_image_to_buffer(
-                        rec.cmd,
-                        image.handle,
-                        Access::TRANSFER_READ.layout,
-                        target.handle,
-                        &[region],
-                    );
-                }
-            }
-            Self::Buffer(buffer) => {
-                rec.buffer(buffer, Access::TRANSFER_READ);
-                rec.buffer(target, Access::TRANSFER_WRITE);
-                rec.flush();
-                let region = vk::BufferCopy { size: buffer.size, ..Default::default() };
-                // SAFETY: as above.
-                unsafe { rec.cx.device.cmd_copy_buffer(rec.cmd, buffer.handle, target.handle, &[region]) };
-            }
-        }
-        rec.buffer(target, Access::HOST_READ);
-        rec.flush();
-        rec.forget(target.handle);
-    }
+fn inputs(view: View, draws: &[Draw], environment: EnvironmentUse, seed: [u32; 2]) -> FrameInputs<'_> {
+    FrameInputs { slot: 0, view, gbuffer: GBufferInput::Draws(draws), environment, seed, output: None }
 }
 
 fn closed() -> Error {

@@ -7,6 +7,8 @@ pub mod environment;
 pub mod gbuffer;
 pub mod materials;
 pub mod modules;
+#[cfg(feature = "offline")]
+pub(crate) mod probe;
 pub mod resolve;
 pub mod shade;
 pub mod tonemap;

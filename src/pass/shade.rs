@@ -64,6 +64,7 @@ impl Shade {
             Estimator::Mis => 0,
             Estimator::Brdf => 1,
             Estimator::BrdfRandom => 2,
+            Estimator::Lookup => 3,
         };
         Ok(Self(ComputePipeline::new(p.build, p.modules, &INTERFACE, p.bridge, p.slots, &[constant])?))
     }
