@@ -129,7 +129,8 @@ fn sequences_flicker() {
 #[test]
 fn jod_is_that_of_its_library() {
     use colorvideovdp::{Color, Cvvdp, DisplayModel, Image, Options};
-    let checks = |k: u32, size: u32| picture(16, 16, move |x, y| [if (x / size + y / size + k) % 2 == 0 { 0.2 } else { 0.4 }; 3]);
+    let checks =
+        |k: u32, size: u32| picture(16, 16, move |x, y| [if (x / size + y / size + k).is_multiple_of(2) { 0.2 } else { 0.4 }; 3]);
     let (a, b) = ([checks(0, 4), checks(1, 4)], [checks(0, 4), checks(0, 4)]);
     let found = measure(&a, &b, &[true; 256], Exposure::Factor(1.0), true).metrics.jod.unwrap();
     let srgb = |v: &f32| encode(f64::from(*v)) as f32;
@@ -237,15 +238,19 @@ fn the_command_reads_png_and_hdr_and_writes_maps() {
         .save(folder.join("a.png"))
         .unwrap();
     image::Rgb32FImage::from_pixel(8, 8, image::Rgb([0.5; 3])).save(folder.join("a.hdr")).unwrap();
+    image::Rgb32FImage::from_pixel(8, 8, image::Rgb([4.0; 3])).save(folder.join("bright.hdr")).unwrap();
     image::RgbImage::new(4, 4).save(folder.join("small.png")).unwrap();
     let run = passband(folder, &["a.hdr", "a.png", "--json", "--diff", "map.png"]);
     assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
     let found: serde_json::Value = serde_json::from_slice(&run.stdout).unwrap();
     // 188 is the byte nearest to a linear half; B's alpha leaves two rows.
     assert!(found["max_abs"].as_f64().unwrap() < 4e-3 && found["pixels"] == 16, "{found}");
+    // Radiance above 1 is kept.
+    let run = passband(folder, &["bright.hdr", "b.exr", "--json"]);
+    assert_eq!(serde_json::from_slice::<serde_json::Value>(&run.stdout).unwrap()["max_abs"], 3.0);
     let map = image::open(folder.join("map.png")).unwrap();
     assert_eq!((map.width(), map.height()), (8, 8));
-    assert_eq!(std::fs::read_dir(folder).unwrap().count(), 5, "a temporary file was left behind");
+    assert_eq!(std::fs::read_dir(folder).unwrap().count(), 6, "a temporary file was left behind");
     let (code, text) = failure(folder, &["small.png", "b.exr"]);
     assert!(code == 2 && text.contains("small.png: expected 8x8 pixels, as b.exr, got 4x4"), "{text}");
     std::fs::write(folder.join("broken.exr"), b"not an image").unwrap();

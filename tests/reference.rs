@@ -390,4 +390,13 @@ fn timings() {
         }
         println!("{line}");
     }
+    for (columns, rows, size) in [(230, 220, 64), (1000, 500, 512)] {
+        let mut world = world(constant());
+        world.objects[0].mesh = Arc::new(sphere(columns, rows));
+        let start = Instant::now();
+        let reference = Reference::with_reflectances(&world, [size, size], Options::default(), vec![&Lambert]).unwrap();
+        let covered = reference.hits().iter().flatten().count();
+        let triangles = 2 * columns * rows;
+        println!("visibility: {triangles} triangles, {size}x{size}, {covered} covered: {:.3} s", start.elapsed().as_secs_f64());
+    }
 }

@@ -5,6 +5,7 @@ mod info;
 mod render;
 mod scenes;
 
+use clap::error::ErrorKind;
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;
 
@@ -48,6 +49,10 @@ fn usage(error: &clap::Error) -> ExitCode {
         // A closed pipe is no failure of ours.
         let _ = error.print();
         return ExitCode::SUCCESS;
+    }
+    if error.kind() == ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand {
+        eprintln!("passband: expected a subcommand, see passband --help");
+        return ExitCode::from(2);
     }
     let text = error.render().to_string();
     let what = text.split("\n\nUsage:").next().unwrap_or_default().trim_start_matches("error: ");

@@ -37,12 +37,11 @@ pub enum Mask<'a> {
 /// [`Error::File`] for a file that is unreadable, malformed, of unknown format, without the mask's layer or with a value
 /// that is not finite, and for a pattern that matches nothing.
 pub fn read_frames(path: &Path, mask: Mask) -> Result<Frames> {
-    let files = match pattern(path) {
-        Some(pattern) if !path.exists() => pattern.files(path)?,
-        _ => vec![(0, path.to_path_buf())],
-    };
-    let mut frames =
-        Frames { sequence: pattern(path).is_some() && !path.exists(), numbers: vec![], pictures: vec![], masks: vec![] };
+    // A file may have `#` in its name.
+    let pattern = pattern(path).filter(|_| !path.exists());
+    let sequence = pattern.is_some();
+    let files = pattern.map_or_else(|| Ok(vec![(0, path.to_path_buf())]), |pattern| pattern.files(path))?;
+    let mut frames = Frames { sequence, numbers: vec![], pictures: vec![], masks: vec![] };
     for (number, file) in files {
         let image = load(&file)?;
         frames.numbers.push(number);

@@ -125,7 +125,7 @@ pub fn integrate(tree: &Tree, normal: DVec3, view: DVec3, reflectance: &dyn Refl
     let mut lobe = Lobe { tangent, bitangent, normal, view, reflectance };
     lobe.view = lobe.local(view);
     let mirror = (normal * (2.0 * normal.dot(view)) - view).normalize();
-    let seeds = seeds(tree, normal, mirror, lobe.width(mirror), HORIZON * options.tolerance.max(0.0).sqrt());
+    let seeds = seeds(tree, normal, mirror, lobe.width(mirror), HORIZON * options.tolerance.max(1e-8).sqrt());
 
     let above = |region: Region| {
         let (axis, radius) = tree.cone(region);
