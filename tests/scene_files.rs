@@ -264,6 +264,17 @@ fn values_are_checked() {
         refused(&with(mark, text), line, &[word]);
     }
     refused(&BASE.replace("position = [0, 0, 3]", ""), 1, &["camera.position"]);
+    refused(&BASE.replace("material = 'grey'", ""), 7, &["objects.0.material"]);
+    refused(
+        &with("material", "[[animation.objects]]\nkeyframes = []\n[animation]\nframes = 1"),
+        13,
+        &["animation.objects.0.object"],
+    );
+    refused(
+        &with("material", "[animation]\nframes = 1\n[[animation.objects]]\nobject = 0"),
+        15,
+        &["animation.objects.0.keyframes"],
+    );
     refused(&BASE.replace("builtin = 'constant'", ""), 4, &["environment", "exactly one"]);
     refused(&BASE.replace("'constant'", "'fog'"), 5, &["environment.builtin", "sun-sky", "fog"]);
     refused(&BASE.replace("builtin = 'constant'", "map = 'x.png'"), 5, &["environment.map", ".exr"]);
