@@ -179,6 +179,11 @@ fn devices_are_not_replaced_and_new_files_are_readable() {
     let e = write_atomically(Path::new("/dev/null"), |file| file.write_all(b"x")).unwrap_err();
     assert!(matches!(e, Error::Write { .. }), "{e}");
     assert!(std::fs::metadata("/dev/null").unwrap().file_type().is_char_device());
+    #[cfg(target_os = "linux")]
+    assert!(
+        matches!(write_png(Path::new("/proc/x.png"), 1, 1, &[0; 4]), Err(Error::Write { .. })),
+        "a folder that takes no files"
+    );
     let folder = tempfile::tempdir().unwrap();
     let (ours, plain) = (folder.path().join("ours"), folder.path().join("plain"));
     write_atomically(&ours, |file| file.write_all(b"x")).unwrap();
@@ -235,6 +240,36 @@ fn environments_clamp_small_negatives_and_refuse_the_rest() {
     write_samples(&path, (4, 2), Compression::ZIP16, vec![("X", FlatSamples::F32(vec![0.0; 8]))]);
     assert!(assert_refused(environment::read(&path), "no colour").contains("got X"));
     assert!(matches!(environment::read(Path::new("sky.png")), Err(Error::Argument { .. })));
+}
+
+/// A tiled file whose header claims smaller levels, with a tile that says it belongs to one.
+#[test]
+fn tiles_of_other_levels_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("tiles.exr");
+    let list = AnyChannels::sort(
+        ["R", "G", "B"].map(|n| AnyChannel::new(n, FlatSamples::F32(vec![1.0; 40 * 33]))).into_iter().collect(),
+    );
+    let encoding = Encoding {
+        compression: Compression::Uncompressed,
+        blocks: Blocks::Tiles(Vec2(16, 8)),
+        line_order: LineOrder::Increasing,
+    };
+    Image::from_layer(Layer::new((40, 33), LayerAttributes::default(), encoding, list)).write().to_file(&path).unwrap();
+    assert_eq!(environment::read(&path).unwrap().texels(), [[1.0; 3]; 40 * 33]);
+    let whole = std::fs::read(&path).unwrap();
+    let tiles = whole.windows(9).position(|w| w == b"tiledesc\0").unwrap() + 9 + 4;
+    // Tiles start with their column, row and level in either direction.
+    let first = whole.windows(16).rposition(|w| w[..4] == [1, 0, 0, 0] && w[4..16] == [0; 12]).unwrap();
+    for mode in 0..4 {
+        for level in [[1, 0], [0, 1], [1, 1], [5, 5], [255, 255]] {
+            let mut bytes = whole.clone();
+            bytes[tiles + 8] = mode;
+            (bytes[first + 8], bytes[first + 12]) = (level[0], level[1]);
+            std::fs::write(&path, &bytes).unwrap();
+            assert_refused(read_exr(&path), &format!("mode {mode}, level {level:?}"));
+        }
+    }
 }
 
 /// One small valid file of each kind, with the function that reads it.
@@ -315,12 +350,12 @@ fn damaged_files_never_panic() {
     };
     for (path, read) in samples(folder.path()) {
         let whole = std::fs::read(&path).unwrap();
-        for end in (0..whole.len().min(600)).chain((600..whole.len()).step_by(97)) {
+        for end in (0..whole.len().min(400)).chain((400..whole.len()).step_by(97)) {
             std::fs::write(&path, &whole[..end]).unwrap();
             let _ = read(&path);
         }
         // Headers are short: half of the changes go there.
-        for round in 0..3000 {
+        for round in 0..500 {
             let mut bytes = whole.clone();
             for _ in 0..1 + random(3) {
                 let at = random(if round % 2 == 0 { whole.len() } else { whole.len().min(500) });

@@ -264,6 +264,17 @@ fn values_are_checked() {
         refused(&with(mark, text), line, &[word]);
     }
     refused(&BASE.replace("position = [0, 0, 3]", ""), 1, &["camera.position"]);
+    refused(&BASE.replace("material = 'grey'", ""), 7, &["objects.0.material"]);
+    refused(
+        &with("material", "[[animation.objects]]\nkeyframes = []\n[animation]\nframes = 1"),
+        13,
+        &["animation.objects.0.object"],
+    );
+    refused(
+        &with("material", "[animation]\nframes = 1\n[[animation.objects]]\nobject = 0"),
+        15,
+        &["animation.objects.0.keyframes"],
+    );
     refused(&BASE.replace("builtin = 'constant'", ""), 4, &["environment", "exactly one"]);
     refused(&BASE.replace("'constant'", "'fog'"), 5, &["environment.builtin", "sun-sky", "fog"]);
     refused(&BASE.replace("builtin = 'constant'", "map = 'x.png'"), 5, &["environment.map", ".exr"]);
@@ -380,6 +391,11 @@ fn files_are_relative_to_the_scene_and_named_when_missing() {
     let world = load(&scene, &[]).unwrap().resolve().unwrap();
     assert_eq!((world.objects[0].mesh.positions.len(), world.name.as_str()), (3, "s"));
     assert!(std::sync::Arc::ptr_eq(&world.objects[0].mesh, &world.objects[1].mesh), "one mesh, loaded once");
+    // A measured table takes the place of whatever the scene has.
+    let mut file = std::fs::File::create(folder.path().join("t.binary")).unwrap();
+    passband::reflectance::stand_in::table("rough").unwrap().write(&mut std::io::BufWriter::new(&mut file)).unwrap();
+    let world = load(&scene, &[("materials.grey.reflectance.merl", "t.binary")]).unwrap().resolve().unwrap();
+    assert!(matches!(world.materials[0].model, Model::Table(_)));
     for (path, value) in [
         ("environment.map", "gone.exr"),
         ("objects.0.mesh", "gone.obj"),

@@ -49,7 +49,7 @@ pub fn read_exr(path: &Path) -> Result<LinearImage> {
         }
     }
     let reader = read().no_deep_data().largest_resolution_level().all_channels().all_layers().all_attributes();
-    let file = reader.from_buffered(Cursor::new(&bytes)).map_err(|e| malformed(path, e))?;
+    let file = guarded(path, || reader.from_buffered(Cursor::new(&bytes)))?;
     let several = file.layer_data.len() > 1;
     let mut channels = Vec::new();
     for layer in file.layer_data {
@@ -100,23 +100,34 @@ pub(crate) fn read_rgb(path: &Path, max: [u64; 2]) -> Result<RgbTexels> {
             *texel = value;
         }
     };
-    let texels = if grey {
-        let new = move |size, _: &(ChannelDescription,)| new(size, &());
-        let channels = flat.specific_channels().required("Y");
-        let channels = channels.collect_pixels(new, move |texels, at, (y,): (f32,)| put(texels, at, [y; 3]));
-        channels.first_valid_layer().all_attributes().from_buffered(source).map(|f| f.layer_data.channel_data.pixels)
-    } else {
-        let new = move |size, _: &RgbChannels| new(size, &());
-        let channels = flat.specific_channels().required("R").required("G").required("B");
-        let channels = channels.collect_pixels(new, move |texels, at, (r, g, b): (f32, f32, f32)| put(texels, at, [r, g, b]));
-        channels.first_valid_layer().all_attributes().from_buffered(source).map(|f| f.layer_data.channel_data.pixels)
-    };
-    Ok((width as u32, height as u32, texels.map_err(|e| malformed(path, e))?))
+    let texels = guarded(path, || {
+        if grey {
+            let new = move |size, _: &(ChannelDescription,)| new(size, &());
+            let channels = flat.specific_channels().required("Y");
+            let channels = channels.collect_pixels(new, move |texels, at, (y,): (f32,)| put(texels, at, [y; 3]));
+            let image = channels.first_valid_layer().all_attributes().from_buffered(source)?;
+            Ok(image.layer_data.channel_data.pixels)
+        } else {
+            let new = move |size, _: &RgbChannels| new(size, &());
+            let channels = flat.specific_channels().required("R").required("G").required("B");
+            let channels = channels.collect_pixels(new, move |texels, at, (r, g, b): (f32, f32, f32)| put(texels, at, [r, g, b]));
+            let image = channels.first_valid_layer().all_attributes().from_buffered(source)?;
+            Ok(image.layer_data.channel_data.pixels)
+        }
+    })?;
+    Ok((width as u32, height as u32, texels))
+}
+
+/// Runs the decoder. On damaged tiled and B44 files it can trip over its own assertions (found by changing bytes at random):
+/// that is one more way to be malformed, not a reason to stop the process.
+fn guarded<T>(path: &Path, decode: impl FnOnce() -> exr::error::Result<T>) -> Result<T> {
+    let outcome = std::panic::catch_unwind(std::panic::AssertUnwindSafe(decode));
+    let inconsistent = |_| Err(exr::error::Error::Invalid("inconsistent blocks".into()));
+    outcome.unwrap_or_else(inconsistent).map_err(|e| malformed(path, e))
 }
 
 fn headers(path: &Path, bytes: &[u8]) -> Result<Vec<Header>> {
-    let meta = MetaData::read_from_buffered(Cursor::new(bytes), false).map_err(|e| malformed(path, e))?;
-    Ok(meta.headers.into_vec())
+    Ok(guarded(path, || MetaData::read_from_buffered(Cursor::new(bytes), false))?.headers.into_vec())
 }
 
 /// Refuses what we do not read, and sizes that the file cannot hold, before anything is allocated.

@@ -76,6 +76,7 @@ impl Source {
         let span = e.span().unwrap_or(0..0);
         let field = self.field(&span);
         if let Some(name) = e.message().strip_prefix("missing field `").and_then(|m| m.strip_suffix('`')) {
+            let field = self.table_of(e, &span).unwrap_or(field);
             let field = if field.is_empty() { name.to_string() } else { format!("{field}.{name}") };
             return self.error_of(&span, field, "a value", "none");
         }
@@ -88,6 +89,16 @@ impl Source {
     fn field(&self, span: &Span) -> String {
         let here = self.places.iter().filter(|(place, _)| place.contains(&span.start));
         here.max_by_key(|(_, path)| path.split('.').count()).map(|(_, path)| path.clone()).unwrap_or_default()
+    }
+
+    /// The table in which `e` misses a key. A header such as `[[a.b]]` is the position of `a` and of its element alike;
+    /// the error's last line tells them apart: the keys that led there, without indices.
+    fn table_of(&self, e: &toml::de::Error, span: &Span) -> Option<String> {
+        let text = e.to_string();
+        let keys = text.lines().last()?.strip_prefix("in `")?.strip_suffix('`')?;
+        let here = self.places.iter().filter(|(place, _)| place.contains(&span.start)).map(|(_, path)| path);
+        let is_key = |segment: &&str| segment.parse::<usize>().is_err();
+        here.filter(|path| path.split('.').filter(is_key).eq(keys.split('.'))).max_by_key(|path| path.split('.').count()).cloned()
     }
 
     fn override_at(&self, span: &Span) -> Option<&str> {
