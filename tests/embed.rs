@@ -72,10 +72,10 @@ fn a_host_with_its_own_gbuffer_gets_the_same_image() {
     assert!(covered * 2 > got.len() && covered < got.len(), "{covered} pixels covered");
     assert!(got.iter().filter(|p| p[3] == 255).all(|p| p[0].max(p[1]).max(p[2]) > 20), "a covered pixel is black");
 
-    let differences = || got.iter().zip(&expected).flat_map(|(g, e)| (0..4).map(|c| (f64::from(g[c]) - e[c]).abs()));
-    let worst = differences().fold(0.0, f64::max);
-    let off = differences().filter(|d| *d > 0.52).count();
-    println!("worst {worst}, off {off} of {}", 4 * got.len());
     assert!(got.iter().zip(&expected).all(|(g, e)| f64::from(g[3]) == e[3]), "coverage differs");
-    assert!(worst < 1.0 && off == 0);
+    // Half a step is the output's rounding to 8 bits. The rest is what 16-bit octahedral normals, at most 4e-5 rad off,
+    // do to the radiance: 0.0007 of a step measured; normals of 8 bits a coordinate would be some hundred times that.
+    let distance = |(g, e): (&[u8; 4], &[f64; 4])| g.iter().zip(e).map(|(g, e)| (f64::from(*g) - e).abs()).fold(0.0, f64::max);
+    let worst = got.iter().zip(&expected).map(distance).fold(0.0, f64::max);
+    assert!(worst < 0.52, "{worst} steps of 255");
 }
