@@ -1,13 +1,10 @@
 //! The example host, as a test: a device, memory and G-buffer encoding of the host's own give the image that the
 //! command's own path gives.
 
-#[path = "../examples/embed_minimal.rs"]
-mod embed_minimal;
-
 mod common;
 
+use common::embed_minimal::{Options, run, scene};
 use common::{DEVICE, assert_clean, headless};
-use embed_minimal::{Options, run, scene};
 use passband::Config;
 use passband::offline::mesh::Mesh;
 use passband::offline::session::Session;

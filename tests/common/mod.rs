@@ -1,12 +1,11 @@
 //! Devices on which tests run: always lavapipe, always under validation with synchronization validation.
 #![allow(dead_code, reason = "each test file uses a part")]
 
-#[path = "../../examples/embed_minimal/device.rs"]
-pub mod device;
-#[path = "../../examples/embed_minimal/memory.rs"]
-pub mod memory;
+#[path = "../../examples/embed_minimal.rs"]
+pub mod embed_minimal;
 pub mod rig;
 
+pub(crate) use embed_minimal::{device, memory};
 use passband::offline::headless::{Headless, Options};
 use passband::{Config, Requirements};
 

@@ -8,8 +8,8 @@ use passband::offline::mesh::Mesh;
 use passband::reflectance::{Ggx, Model};
 use passband::sampling::LatLong;
 use passband::{
-    Access, AllocationError, Block, Config, DedicatedAllocator, Draw, EnvironmentUse, FrameInputs, GBufferInput, HostAllocator,
-    ImageRef, Location, Output, Renderer, Requirements, Retired, Transfer, View,
+    Access, AllocationError, Block, Config, DedicatedAllocator, Draw, EnvironmentUse, Error, FrameInputs, GBufferInput,
+    HostAllocator, ImageRef, Location, Output, Renderer, Requirements, Retired, Transfer, View,
 };
 
 /// Counts blocks, maps all of them (lavapipe's memory is all visible), and fails request number `fail_at` if told to.
@@ -19,6 +19,8 @@ pub struct Memory {
     pub live: Vec<(String, u64, usize)>,
     pub requests: usize,
     pub fail_at: Option<usize>,
+    /// What the request that failed last was for.
+    pub refused: Option<String>,
     token: u64,
 }
 
@@ -26,7 +28,7 @@ impl Memory {
     pub fn new(gpu: &Gpu) -> Self {
         // SAFETY: the rig frees all blocks before its device goes.
         let plain = unsafe { DedicatedAllocator::new(&gpu.instance, gpu.physical_device, &gpu.device) };
-        Self { plain, live: Vec::new(), requests: 0, fail_at: None, token: 0 }
+        Self { plain, live: Vec::new(), requests: 0, fail_at: None, refused: None, token: 0 }
     }
 
     /// The bytes of the live blocks called `name`, newest last.
@@ -42,6 +44,7 @@ unsafe impl HostAllocator for Memory {
     fn allocate(&mut self, request: &MemoryRequest<'_>) -> Result<Block, AllocationError> {
         self.requests += 1;
         if self.fail_at == Some(self.requests - 1) {
+            self.refused = Some(request.name.into());
             return Err(AllocationError("refused by the test".into()));
         }
         let visible = MemoryRequest { location: Location::Upload, ..*request };
@@ -110,6 +113,17 @@ impl Rig {
             bag.free(device, &mut self.memory);
             value
         }
+    }
+
+    /// As [`Self::submit`], for calls that may fail: what they recorded until then is submitted all the same.
+    pub fn try_submit(
+        &mut self,
+        record: impl FnOnce(vk::CommandBuffer, &Gpu, &mut Memory) -> Result<Retired, Error>,
+    ) -> Result<(), Error> {
+        self.submit(|cmd, gpu, memory| match record(cmd, gpu, memory) {
+            Ok(bag) => (Ok(()), bag),
+            Err(error) => (Err(error), Retired::default()),
+        })
     }
 
     /// A renderer with an environment and a grey material.
@@ -228,12 +242,16 @@ impl Target {
             ((), Retired::default())
         });
         let texels = bytemuck::pod_collect_to_vec(self.pixels.bytes());
-        // SAFETY: the copy was waited for.
+        self.free(rig);
+        texels
+    }
+
+    pub fn free(self, rig: &mut Rig) {
+        // SAFETY: every submission is waited for.
         unsafe {
             self.pixels.free(&rig.gpu, &mut rig.memory);
             self.own.free(&rig.gpu, &mut rig.memory);
         }
-        texels
     }
 }
 
