@@ -33,6 +33,15 @@ fn tables() -> Vec<Arc<MerlTable>> {
     stand_in::names().iter().map(|name| Arc::new(stand_in::table(name).unwrap())).collect()
 }
 
+/// A table that tells every angle, also phi_diff from its mirror image, which the stand-ins do not; phi_diff only where it
+/// means something.
+fn telltale() -> MerlTable {
+    MerlTable::from_fn(|half, diff, phi| {
+        let turn = half.sin() * diff.sin() * DVec3::new((2.0 * phi).sin(), (2.0 * phi).cos(), phi.sin());
+        DVec3::new(1.0, 0.2 + half, 0.6 + diff) + 0.2 * turn
+    })
+}
+
 /// What the device holds of a table, in the same form.
 fn as_packed(table: &MerlTable) -> MerlTable {
     let (scale, entries) = table.packed();
@@ -118,34 +127,65 @@ fn ggx_evaluation_and_reciprocity() {
 
 #[test]
 fn table_evaluation_and_reciprocity() {
-    let tables = tables();
+    let mut tables = tables();
+    tables.push(Arc::new(telltale()));
     // Between other materials, so that a table's place in the atlas is not its index.
     let mut models: Vec<_> = tables.iter().cloned().map(Model::Table).collect();
     models.insert(1, ggx(0.2, DVec3::ONE, DVec3::ZERO));
-    let places = [0, 2, 3];
+    let places = [0, 2, 3, 4];
     let packed: Vec<_> = tables.iter().map(|t| as_packed(t)).collect();
     let mut device = Device::new(models, None);
-    let mut pairs: Vec<_> = (0..3 * COUNT).map(pair).collect();
-    pairs.extend(edges().into_iter().flat_map(|e| [e; 3]));
-    let mut worst = [(); 3].map(|()| [(); 3].map(|()| Worst::default()));
+    let mut pairs: Vec<_> = (0..4 * COUNT).map(pair).collect();
+    pairs.extend(edges().into_iter().flat_map(|e| [e; 4]));
+    let mut worst = [(); 4].map(|()| [(); 3].map(|()| Worst::default()));
     evaluated(
         &mut device,
         &pairs,
-        |i| places[i % 3],
+        |i| places[i % 4],
         |i, [wi, wo, forth, back]| {
             let at = || format!("{wi}, {wo}");
-            let [device, reciprocity, packing] = &mut worst[i % 3];
-            let (held, exact) = (packed[i % 3].evaluate(wi, wo), tables[i % 3].evaluate(wi, wo));
+            let [device, reciprocity, packing] = &mut worst[i % 4];
+            let (held, exact) = (packed[i % 4].evaluate(wi, wo), tables[i % 4].evaluate(wi, wo));
             // A channel far below the largest is held in few steps; against the packed table that does not count.
             device.add(relative(forth, held), at);
             reciprocity.add(relative(back, forth), at);
             packing.add((held - exact).abs().max_element() / exact.max_element(), at);
         },
     );
-    for (name, [device, reciprocity, packing]) in stand_in::names().iter().zip(&worst) {
+    for (name, [device, reciprocity, packing]) in stand_in::names().iter().chain(&["telltale"]).zip(&worst) {
         device.within(&format!("{name} on the device against its packed table, relative"), EVALUATION);
         reciprocity.within(&format!("{name} with directions swapped, relative"), EVALUATION);
         packing.within(&format!("{name} packed, of the largest channel"), 4e-3);
+    }
+}
+
+/// Tables and density tiles stand side by side: wherever one of them is in the atlas, its neighbours' peaks do not show.
+#[test]
+fn neighbours_do_not_show() {
+    let (peaked, flat) = (Arc::new(as_packed(&stand_in::table("mirror-metal").unwrap())), Arc::new(as_packed(&telltale())));
+    let importance = ImportanceTable::build(flat.as_ref());
+    // The last fills more than one row of tables.
+    for count in [4, 7, 23] {
+        let copy = |i: usize| Arc::new(MerlTable::clone(if i % 2 == 0 { &peaked } else { &flat }));
+        let mut device = Device::new((0..count).map(|i| Model::Table(copy(i))).collect(), None);
+        let flats = count / 2;
+        let id = |i: usize| (2 * (i % flats) + 1) as u32;
+        let pairs: Vec<_> = edges().into_iter().flat_map(|e| vec![e; flats]).collect();
+        let mut worst = Worst::default();
+        evaluated(&mut device, &pairs, id, |i, [wi, wo, forth, _]| {
+            worst.add(relative(forth, flat.evaluate(wi, wo)), || format!("table {}, {wi}, {wo}", id(i)));
+        });
+        worst.within(&format!("one of {count} tables, relative"), EVALUATION);
+
+        // At the horizon the peak of the next material is one row away.
+        let low: Vec<_> = (0..64 * flats).map(|i| (i, rounded(DVec3::new((i as f64).cos(), (i as f64).sin(), 1e-4)))).collect();
+        let input: Vec<_> = low.iter().flat_map(|&(i, h)| [entry(h, id(i)), [0.5f32.to_bits(), 0, 0, 0]]).collect();
+        let mut worst = Worst::default();
+        for (&(i, h), got) in low.iter().zip(device.probe("density", &input).chunks(2)) {
+            let expected = importance.density(0.5, h.as_dvec3());
+            worst.add((f64::from(got[0][0]) / expected - 1.0).abs(), || format!("material {}, {h}", id(i)));
+        }
+        worst.within(&format!("smooth density of one of {count}, relative"), SMOOTH);
     }
 }
 
