@@ -63,7 +63,7 @@ vec3 to_world(Local f, vec3 w) {
 }
 
 // Contribution of direction number i drawn from the reflectance.
-vec3 brdf_direction(Local f, Material m, uvec2 u) {
+vec3 brdf_contribution(Local f, Material m, uvec2 u) {
     vec4 h = material_sample(m, u);
     float cos_d = dot(f.view, h.xyz);
     vec3 wi = h.xyz * (2.0 * cos_d) - f.view;
@@ -84,16 +84,20 @@ vec3 brdf_direction(Local f, Material m, uvec2 u) {
 }
 
 // Contribution of a direction drawn from the environment.
-vec3 environment_direction(Local f, Material m, uvec2 u) {
-    EnvironmentSample s = environment_sample(u);
-    vec3 wi = vec3(dot(s.direction, f.x), dot(s.direction, f.y), dot(s.direction, f.z));
-    if (wi.z <= 0.0) {
-        return vec3(0.0);
-    }
+vec3 environment_contribution(Local f, Material m, uvec2 u) {
+    vec2 uv = environment_place(u);
+    vec4 w = environment_direction(uv);
+    vec3 wi = vec3(dot(w.xyz, f.x), dot(w.xyz, f.y), dot(w.xyz, f.z));
+    bool above = wi.z > 0.0;
+    // Where lanes run in lock step without masked loads, those below the horizon read one common place instead of scattered ones.
+    uv = above ? uv : vec2(0.0);
+    wi = above ? wi : vec3(0.0, 0.0, 1.0);
+    vec4 light = environment_fetch(uv);
     vec3 h = normalize(wi + f.view);
+    float environment = float(push.environment_samples) * environment_per_steradian(light.a, w.w);
     float brdf = float(push.brdf_samples) * material_density(m, h) * 0.25 / dot(f.view, h);
-    vec3 value = material_evaluate(m, wi, f.view, h) * s.radiance * wi.z;
-    return value / (brdf + float(push.environment_samples) * s.density);
+    vec3 value = material_evaluate(m, wi, f.view, h) * light.rgb * wi.z / (brdf + environment);
+    return above ? value : vec3(0.0);
 }
 
 // Reflectance and radiance in an arbitrary direction: no estimate, but the look-ups that every estimate is made of.
@@ -124,12 +128,12 @@ void main() {
     }
     uvec2 seeds = sobol_seeds(seed);
     for (uint i = 0u; i < push.brdf_samples; ++i) {
-        sum += brdf_direction(f, m, ESTIMATOR == ESTIMATOR_BRDF_RANDOM ? random_point(i, seed) : sobol_point(i, seeds));
+        sum += brdf_contribution(f, m, ESTIMATOR == ESTIMATOR_BRDF_RANDOM ? random_point(i, seed) : sobol_point(i, seeds));
     }
     if (ESTIMATOR == ESTIMATOR_MIS) {
         seeds = sobol_seeds(seed + 1u);
         for (uint i = 0u; i < push.environment_samples; ++i) {
-            sum += environment_direction(f, m, sobol_point(i, seeds));
+            sum += environment_contribution(f, m, sobol_point(i, seeds));
         }
     }
     imageStore(radiance, p, vec4(sum, 1.0));

@@ -69,8 +69,8 @@ vec4 material_sample(Material m, uvec2 u) {
     vec2 size = cell.yw - cell.xz;
     vec2 at = cell.xz + size * (vec2(row_fraction >> 8, column_fraction >> 8) * (1.0 / 16777216.0));
     float s = sqrt(at.x * (2.0 - at.x));
-    float phi = (u.y & 0x80000000u) == 0u ? at.y : -at.y;
-    return vec4(s * cos(phi), s * sin(phi), 1.0 - at.x, 1.0 / (float(2u * IMPORTANCE_ROWS * IMPORTANCE_COLUMNS) * size.x * size.y));
+    vec2 phi = cos_sin((u.y & 0x80000000u) == 0u ? at.y : -at.y);
+    return vec4(s * phi, 1.0 - at.x, 1.0 / (float(2u * IMPORTANCE_ROWS * IMPORTANCE_COLUMNS) * size.x * size.y));
 }
 
 // Smooth density of h in 1/sr, for multiple importance weights only: positive, deterministic, close to that of material_sample.

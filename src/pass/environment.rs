@@ -17,7 +17,7 @@ pub const NAME: &str = "environment";
 pub(crate) struct EnvironmentImages {
     /// RGBA32F: radiance; density over uv.
     pub map: Image,
-    /// RG32UI: threshold as float bits; alias.
+    /// RG32UI: threshold as float bits; alias as row << 16 | column.
     pub alias: Image,
 }
 
@@ -29,15 +29,20 @@ pub(crate) struct EnvironmentUpload {
 
 impl EnvironmentUpload {
     pub fn new(build: &mut Build<'_>, map: &LatLong) -> Result<Self> {
+        if map.width() > 65535 || map.height() > 65535 {
+            let got = format!("{}x{}", map.width(), map.height());
+            return Err(Error::invalid("environment", "at most 65535 texels a side", got));
+        }
         // Its largest sum over texels must stay finite in 32 bits.
         let brightest = map.texels().iter().flatten().copied().fold(0.0, f32::max);
         if brightest > 1e30 {
             return Err(Error::invalid("environment radiance", "at most 1e30", brightest));
         }
         let importance = EnvironmentImportance::build(map)?;
-        let radiance: Vec<[f32; 4]> =
-            map.texels().iter().zip(importance.density_texels()).map(|(&[r, g, b], density)| [r, g, b, density]).collect();
-        let alias: Vec<[u32; 2]> = importance.alias().entries().iter().map(|e| [e.threshold.to_bits(), e.alias]).collect();
+        let density = importance.density_texels();
+        let radiance: Vec<[f32; 4]> = map.texels().iter().zip(&density).map(|(&[r, g, b], &d)| [r, g, b, d]).collect();
+        let place = |texel: u32| (texel / map.width()) << 16 | texel % map.width();
+        let alias: Vec<[u32; 2]> = importance.alias().entries().iter().map(|e| [e.threshold.to_bits(), place(e.alias)]).collect();
         let desc = |name, format| ImageDesc {
             name,
             format,
@@ -58,8 +63,7 @@ impl EnvironmentUpload {
 impl EnvironmentImages {
     /// Declares both images sampled by the pass that is open.
     pub fn sampled(&self, rec: &mut Recorder<'_>) {
-        rec.image(&self.map, Access::COMPUTE_SAMPLED);
-        rec.image(&self.alias, Access::COMPUTE_SAMPLED);
+        [&self.map, &self.alias].into_iter().for_each(|image| rec.image(image, Access::COMPUTE_SAMPLED));
     }
 
     pub fn retire(self, states: &mut States, bag: &mut Retired) {
