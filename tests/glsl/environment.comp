@@ -4,10 +4,11 @@
 #include "environment.glsl"
 
 vec4 probe(uint i) {
-    EnvironmentSample s = environment_sample(entries[i].xy);
+    vec2 uv = environment_place(entries[i].xy);
+    vec4 w = environment_direction(uv);
+    vec4 light = environment_fetch(uv);
     if ((i & 1u) == 0u) {
-        return vec4(s.direction, s.density);
+        return vec4(w.xyz, environment_per_steradian(light.a, w.w));
     }
-    float density = environment_lookup(s.direction).a;
-    return vec4(s.radiance, environment_per_steradian(density, length(s.direction.xz)));
+    return vec4(light.rgb, environment_per_steradian(environment_lookup(w.xyz).a, length(w.xz)));
 }

@@ -77,6 +77,26 @@ fn arc_tangents() {
 }
 
 #[test]
+fn cosine_and_sine() {
+    let mut inputs: Vec<f32> = (0..COUNT).map(|i| ((2.0 * unit(i, 10)[0] - 1.0) * PI) as f32).collect();
+    inputs.extend((0..COUNT).map(|i| 10f64.powf(-12.0 * unit(i, 11)[0]) as f32));
+    inputs.extend([0.0, FRAC_PI_2, PI].iter().flat_map(|&x| [x as f32, -x as f32]));
+    let output = Device::bare().probe("angles", &inputs.iter().map(|x| [x.to_bits(), 0, 0, 2]).collect::<Vec<_>>());
+    let (mut both, mut small) = (Worst::default(), Worst::default());
+    for (&x, got) in inputs.iter().zip(output) {
+        let x = f64::from(x);
+        let [c, s, ..] = got.map(f64::from);
+        both.add((c - x.cos()).abs().max((s - x.sin()).abs()), || format!("{x}"));
+        if x.abs() < 1.0 {
+            small.add((s - x.sin()).abs() / x.sin().abs().max(1e-30), || format!("{x}"));
+        }
+    }
+    // 5e-8 of the polynomial, the rounding of pi and that of the result.
+    both.within("cos_sin", 2.5e-7);
+    small.within("sine of less than 1, relative", 2.5e-7);
+}
+
+#[test]
 fn latlong_coordinates_and_directions() {
     let axes = [Vec3::X, Vec3::NEG_X, Vec3::Y, Vec3::NEG_Y, Vec3::Z, Vec3::NEG_Z];
     // The seam is at +Z; the poles at +Y and -Y.
@@ -114,7 +134,7 @@ fn latlong_coordinates_and_directions() {
         let steep = (uv.y * PI).sin();
         returned.add(((f64::from(back[1]) - uv.y).abs() * steep).max(apart(back[0].into(), uv.x, 1.0) * steep), at);
     }
-    // The device's own sine and cosine, of an argument up to pi in 32 bits.
+    // Cosine and sine, of an argument up to pi in 32 bits.
     toward.within("direction of uv", 1e-6);
     sine.within("sine of theta", 1e-6);
     returned.within("uv there and back, times the sine of theta", 1e-6);
