@@ -14,6 +14,9 @@ const uint IMPORTANCE_ANGLES = 64u;
 const uint IMPORTANCE_ROWS = 64u;
 const uint IMPORTANCE_COLUMNS = 16u;
 const vec2 DENSITY_SIZE = vec2(16.0, 64.0); // cos(phi_h), warped theta_h
+// Least distance in texels from the edge of a table in the atlas: the outermost bins' centres, and more than the rounding of a
+// coordinate can miss them by in an atlas of 8 x 8 tables. The neighbour's values may be a million times higher.
+const float TABLE_BORDER = 0.5 + 1.0 / 8192.0;
 
 struct MaterialRecord {
     uvec4 kind;  // reflectance kind, table's place in the atlas (theta_d, theta_h), unused
@@ -52,7 +55,7 @@ vec3 material_evaluate(Material m, vec3 wi, vec3 wo, vec3 h) {
         return ggx_evaluate(m.record.f0.rgb, m.record.albedo.rgb, m.record.f0.a, wi, wo, h);
     }
     vec2 c = vec2(acos_positive(clamp(dot(wo, h), 0.0, 1.0)) * (2.0 * INV_PI), half_warp(h)) * TABLE_SIZE.yz;
-    c = clamp(c, vec2(0.5), TABLE_SIZE.yz - 0.5) + m.table;
+    c = clamp(c, vec2(TABLE_BORDER), TABLE_SIZE.yz - TABLE_BORDER) + m.table;
     vec3 at = vec3(difference_turn(wi, h), c / vec2(textureSize(reflectance_tables, 0).yz));
     return textureLod(reflectance_tables, at, 0.0).rgb * m.record.albedo.a;
 }
