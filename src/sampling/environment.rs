@@ -1,10 +1,11 @@
 //! Directions in proportion to an environment's light. The density is the *bilinear* interpolation of a weight per texel,
-//! drawn exactly: a texel from an alias table, then a tent-distributed offset of up to one texel around its centre, since a
+//! drawn exactly: a row, a texel of the row, then a tent-distributed offset of up to one texel around its centre, since a
 //! bilinear surface is a sum of tents. Twin of `glsl/include/environment.glsl`.
 
 use crate::error::Result;
+use crate::sampling::inversion::Interval;
 use crate::sampling::latlong::{LatLong, direction, uv};
-use crate::sampling::{AliasTable, luminance, sobol};
+use crate::sampling::{InversionTable, luminance};
 use glam::{DVec2, DVec3};
 use std::f64::consts::PI;
 
@@ -16,7 +17,9 @@ const LEAST_SIN: f64 = 1e-9;
 /// The sampling distribution of one [`LatLong`].
 #[derive(Clone, Debug)]
 pub struct EnvironmentImportance {
-    alias: AliasTable,
+    rows: InversionTable,
+    /// One table a row.
+    columns: Vec<InversionTable>,
     density: LatLong,
 }
 
@@ -33,10 +36,12 @@ impl EnvironmentImportance {
         let floor = if mean > 0.0 { FLOOR * mean } else { 1.0 };
         let weights: Vec<f64> = map.texels().iter().enumerate().map(|(i, &t)| light(t).max(floor) * sine(i)).collect();
 
-        let alias = AliasTable::build(&weights)?;
-        let to_density = weights.len() as f64 / weights.iter().sum::<f64>();
-        let density = weights.iter().map(|w| [(w * to_density) as f32; 3]).collect();
-        Ok(Self { alias, density: LatLong::new(map.width(), map.height(), density)? })
+        let columns = weights.chunks_exact(width).map(InversionTable::build).collect::<Result<Vec<_>>>()?;
+        let rows = InversionTable::build(&weights.chunks_exact(width).map(|row| row.iter().sum()).collect::<Vec<f64>>())?;
+        let texels = (width * height) as f64;
+        let density = |i: usize| texels * rows.probability(i / width) * columns[i / width].probability(i % width);
+        let density = (0..width * height).map(|i| [density(i) as f32; 3]).collect();
+        Ok(Self { rows, columns, density: LatLong::new(map.width(), map.height(), density)? })
     }
 
     /// The density over the unit square of map coordinates at each texel centre (mean 1), row-major: what the GPU stores
@@ -45,20 +50,32 @@ impl EnvironmentImportance {
         self.density.texels().iter().map(|t| t[0]).collect()
     }
 
-    /// The distribution over texels.
-    pub fn alias(&self) -> &AliasTable {
-        &self.alias
+    /// What the GPU draws from, as an image with its extent: each texel's interval in its row; the rows' own are in one more
+    /// row below, or in one more column where the map is taller than wide.
+    pub fn intervals(&self) -> ([u32; 2], Vec<Interval>) {
+        let (width, height) = (self.density.width(), self.density.height());
+        let tall = height > width;
+        let mut image = Vec::new();
+        for (columns, row) in self.columns.iter().zip(self.rows.intervals()) {
+            image.extend_from_slice(columns.intervals());
+            image.extend(tall.then_some(*row));
+        }
+        if tall {
+            return ([width + 1, height], image);
+        }
+        image.extend_from_slice(self.rows.intervals());
+        image.resize(width as usize * (height as usize + 1), Interval { start: 0, guide: 0 });
+        ([width, height + 1], image)
     }
 
-    /// A direction and its density per steradian, from two uniforms as fractions of 2^32: the first picks the texel and,
-    /// with what the alias decision leaves of it, the offset in u; the second the offset in v. Offsets wrap in u and are
-    /// reflected at the poles, which equals bilinear interpolation clamped there.
+    /// A direction and its density per steradian, from two uniforms as fractions of 2^32: the second picks the row and, by
+    /// its place in the row's interval, the offset in v; the first likewise the texel and the offset in u. Offsets wrap in u
+    /// and are reflected at the poles, which equals bilinear interpolation clamped there.
     pub fn sample(&self, u: [u32; 2]) -> (DVec3, f64) {
-        let (texel, rest) = self.alias.draw(u[0]);
-        let (width, height) = (self.density.width(), self.density.height());
-        let (column, row) = (f64::from(texel % width), f64::from(texel / width));
-        let x = (column + 0.5 + tent(rest)) / f64::from(width);
-        let y = ((row + 0.5 + tent(sobol::to_unit(u[1]))) / f64::from(height)).abs();
+        let (row, down) = self.rows.draw(u[1]);
+        let (column, across) = self.columns[row as usize].draw(u[0]);
+        let x = (f64::from(column) + 0.5 + tent(across)) / f64::from(self.density.width());
+        let y = ((f64::from(row) + 0.5 + tent(down)) / f64::from(self.density.height())).abs();
         let y = if y > 1.0 { 2.0 - y } else { y };
         let w = direction(DVec2::new(x.rem_euclid(1.0), y));
         (w, self.pdf(w))
