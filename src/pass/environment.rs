@@ -41,7 +41,7 @@ impl EnvironmentUpload {
         let importance = EnvironmentImportance::build(map)?;
         let density = importance.density_texels();
         let radiance: Vec<[f32; 4]> = map.texels().iter().zip(&density).map(|(&[r, g, b], &d)| [r, g, b, d]).collect();
-        let place = |texel: u32| (texel / map.width()) << 16 | texel % map.width();
+        let place = |texel: u32| ((texel / map.width()) << 16) | (texel % map.width());
         let alias: Vec<[u32; 2]> = importance.alias().entries().iter().map(|e| [e.threshold.to_bits(), place(e.alias)]).collect();
         let desc = |name, format| ImageDesc {
             name,
