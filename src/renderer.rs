@@ -223,6 +223,9 @@ impl Renderer {
         let (Some(environment), Some(materials)) = (&self.environment, &self.materials) else {
             return Err(Error::CallOrder { called: "record", before });
         };
+        if let GBufferInput::Draws(draws) = inputs.gbuffer {
+            gbuffer::check_materials(draws, materials.count())?;
+        }
         if let Some(timings) = self.timer.begin_frame(&self.cx, cmd, inputs.slot)? {
             self.timings = Some(timings);
         }

@@ -70,6 +70,16 @@ impl MaterialsUpload {
         if models.is_empty() || models.len() > MAX_MATERIALS {
             return Err(Error::invalid("materials", format!("1 to {MAX_MATERIALS}"), models.len()));
         }
+        for (i, model) in models.iter().enumerate() {
+            if let Model::Ggx(ggx) = model {
+                ggx.validate().map_err(|e| match e {
+                    Error::InvalidInput { field, expected, got } => {
+                        Error::invalid(format!("materials[{i}].{field}"), expected, got)
+                    }
+                    other => other,
+                })?;
+            }
+        }
         // A table that several materials share is stored once.
         let mut tables: Vec<&Arc<MerlTable>> = Vec::new();
         let mut slots = Vec::new();
@@ -175,6 +185,11 @@ fn side_by_side<'a, T: Copy + 'a>(materials: impl Iterator<Item = &'a [T]>, rows
 }
 
 impl MaterialImages {
+    /// Materials that draws may name.
+    pub fn count(&self) -> u32 {
+        (self.records.size / size_of::<Record>() as u64) as u32
+    }
+
     /// Declares everything read by the pass that is open.
     pub fn sampled(&self, rec: &mut Recorder<'_>) {
         rec.buffer(&self.records, Access::COMPUTE_READ);
