@@ -37,6 +37,7 @@ pub fn world(mesh: &str, detail: u32, model: Model, map: LatLong) -> World {
         camera: Camera { position: DVec3::new(0.0, 0.5, 3.6), target: DVec3::ZERO, up: DVec3::Y, fov_y: 36.0 },
         size: None,
         environment: Some(EnvironmentLight { map, intensity: 1.0, rotation: 0.0, visible: false }),
+        lights: Vec::new(),
         objects: vec![Object { mesh: Arc::new(builtin::mesh(mesh, detail).unwrap()), transform: turn, material: 0 }],
         materials: vec![Material { name: "material".into(), model }],
     }

@@ -166,7 +166,7 @@ fn neighbours_do_not_show() {
     let importance = ImportanceTable::build(flat.as_ref());
     // The last fills more than one row of tables.
     for count in [4, 7, 23] {
-        let copy = |i: usize| Arc::new(MerlTable::clone(if i % 2 == 0 { &peaked } else { &flat }));
+        let copy = |i: usize| Arc::new(MerlTable::clone(if i.is_multiple_of(2) { &peaked } else { &flat }));
         let mut device = Device::new((0..count).map(|i| Model::Table(copy(i))).collect(), None);
         let flats = count / 2;
         let id = |i: usize| (2 * (i % flats) + 1) as u32;
