@@ -129,6 +129,7 @@ pub fn run(options: &Options) -> Result<Report, Box<dyn Error>> {
                 view,
                 gbuffer: GBufferInput::Host { set: targets.set, images: &targets.gbuffer() },
                 environment: EnvironmentUse::default(),
+                lights: &[],
                 seed: [0, 0],
                 output: Some(Output { image: output, transfer: Transfer::Srgb { exposure: 0.5 } }),
             };

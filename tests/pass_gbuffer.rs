@@ -47,6 +47,7 @@ fn render(camera: Camera, objects: Vec<(Mesh, Mat4, usize)>) -> Vec<Sample> {
         camera,
         size: None,
         environment: None,
+        lights: Vec::new(),
         objects: objects
             .into_iter()
             .map(|(mesh, transform, material)| Object { mesh: Arc::new(mesh), transform, material })

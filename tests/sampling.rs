@@ -177,8 +177,8 @@ fn environment_density_is_the_floored_luminance_times_the_sine() {
     for (name, map) in maps() {
         let importance = EnvironmentImportance::build(&map).unwrap();
         let texels = importance.density_texels();
-        let (extent, intervals) = importance.intervals();
-        assert_eq!(intervals.len(), (extent[0] * extent[1]) as usize);
+        let (extent, entries) = importance.entries();
+        assert_eq!(entries.len(), (extent[0] * extent[1]) as usize);
         assert_eq!(extent.iter().sum::<u32>(), map.width() + map.height() + 1);
         let luminance: Vec<f64> =
             map.texels().iter().map(|t| 0.2126 * f64::from(t[0]) + 0.7152 * f64::from(t[1]) + 0.0722 * f64::from(t[2])).collect();

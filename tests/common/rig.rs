@@ -223,6 +223,7 @@ impl Target {
             view: view(self.image.extent),
             gbuffer: GBufferInput::Draws(draws),
             environment: EnvironmentUse::default(),
+            lights: &[],
             seed: [7, 0],
             output: Some(Output { image: self.image, transfer: Transfer::Linear }),
         }
