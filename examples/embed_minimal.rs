@@ -71,15 +71,7 @@ pub fn run(options: &Options) -> Result<Report, Box<dyn Error>> {
 
     // 2  The renderer, with the passes compiled to read this host's G-buffer.
     config.gbuffer = GBufferSource::Host { layout: raster.set_layout };
-    let modules: [(&str, &[u8]); 4] = [
-        ("curvature.comp", include_bytes!("embed_minimal/spirv/curvature.comp.spv")),
-        ("classify.comp", include_bytes!("embed_minimal/spirv/classify.comp.spv")),
-        ("shade.comp", include_bytes!("embed_minimal/spirv/shade.comp.spv")),
-        ("resolve.comp", include_bytes!("embed_minimal/spirv/resolve.comp.spv")),
-    ];
-    for (name, bytes) in modules {
-        config.modules.replace(name, read_spv(&mut Cursor::new(bytes))?);
-    }
+    replace_modules(&mut config)?;
     // SAFETY: the device has what `Requirements` asked for and outlives the renderer.
     let mut renderer = unsafe { Renderer::new(&gpu.host(), &config, &mut memory) }?;
 
@@ -166,6 +158,20 @@ pub fn run(options: &Options) -> Result<Report, Box<dyn Error>> {
         device.destroy_command_pool(pool, None);
     }
     Ok(Report { device: gpu.name.clone(), messages: gpu.close(), image, live_blocks: memory.live })
+}
+
+/// The passes that read the G-buffer, compiled with this host's bridge.
+pub(crate) fn replace_modules(config: &mut Config) -> Result<(), Box<dyn Error>> {
+    let modules: [(&str, &[u8]); 4] = [
+        ("curvature.comp", include_bytes!("embed_minimal/spirv/curvature.comp.spv")),
+        ("classify.comp", include_bytes!("embed_minimal/spirv/classify.comp.spv")),
+        ("shade.comp", include_bytes!("embed_minimal/spirv/shade.comp.spv")),
+        ("resolve.comp", include_bytes!("embed_minimal/spirv/resolve.comp.spv")),
+    ];
+    for (name, bytes) in modules {
+        config.modules.replace(name, read_spv(&mut Cursor::new(bytes))?);
+    }
+    Ok(())
 }
 
 impl Grave {

@@ -3,12 +3,16 @@
 
 mod common;
 
-use common::embed_minimal::{Options, run, scene};
+use common::embed_minimal::memory::Buffer;
+use common::embed_minimal::raster::{Raster, Targets};
+use common::embed_minimal::{Options, replace_modules, run, scene};
+use common::rig::Rig;
 use common::{DEVICE, assert_clean, headless};
-use passband::Config;
+use passband::ash::vk;
 use passband::offline::mesh::Mesh;
 use passband::offline::session::Session;
 use passband::offline::world::{Camera, EnvironmentLight, Material, Object, World};
+use passband::{Access, Config, EnvironmentUse, FrameInputs, GBufferInput, GBufferSource, Location, Output, Transfer};
 use std::sync::Arc;
 
 const EXTENT: [u32; 2] = [97, 64];
@@ -75,4 +79,67 @@ fn a_host_with_its_own_gbuffer_gets_the_same_image() {
     let distance = |(g, e): (&[u8; 4], &[f64; 4])| g.iter().zip(e).map(|(g, e)| (f64::from(*g) - e).abs()).fold(0.0, f64::max);
     let worst = got.iter().zip(&expected).map(distance).fold(0.0, f64::max);
     assert!(worst < 0.52, "{worst} steps of 255");
+}
+
+/// Another exit than the example's, put to use at once in the same command buffer, where the layer follows layouts and
+/// accesses: a wrong layout or a missing wait is a message.
+#[test]
+fn host_images_are_left_as_their_exit_says() {
+    let mut rig = Rig::new();
+    let raster = Raster::new(&rig.gpu, &mut rig.memory, &scene::objects()).unwrap();
+    let mut targets = Targets::new(&rig.gpu, &mut rig.memory, &raster, EXTENT).unwrap();
+    let gbuffer = GBufferSource::Host { layout: raster.set_layout };
+    let mut config = Config { directions: 2, curvature: true, gbuffer, ..Config::new(EXTENT) };
+    replace_modules(&mut config).unwrap();
+    let mut renderer = rig.renderer(&config);
+    // SAFETY: the command buffer is recording.
+    rig.try_submit(|cmd, _, memory| unsafe { renderer.record_materials(cmd, &scene::materials(), memory) }).unwrap();
+
+    let pixels = (EXTENT[0] * EXTENT[1]) as usize;
+    let mut copies = [4, 4, 2, 4].map(|bytes: usize| {
+        let usage = vk::BufferUsageFlags::TRANSFER_DST;
+        Buffer::new(&rig.gpu, &mut rig.memory, bytes * pixels, usage, Location::Readback).unwrap()
+    });
+    rig.submit(|cmd, gpu, _| {
+        let view = scene::view(EXTENT);
+        let output = targets.output();
+        // SAFETY: the command buffer is recording; every submission is waited for.
+        unsafe { raster.record(gpu, cmd, &mut targets, &view) };
+        let mut images = targets.gbuffer();
+        images.iter_mut().for_each(|image| image.exit = Access::TRANSFER_READ);
+        let inputs = FrameInputs {
+            slot: 0,
+            view,
+            gbuffer: GBufferInput::Host { set: targets.set, images: &images },
+            environment: EnvironmentUse::default(),
+            seed: [0, 0],
+            output: Some(Output { image: output, transfer: Transfer::Linear }),
+        };
+        // SAFETY: as above; each buffer holds its whole image.
+        unsafe {
+            renderer.record(cmd, &inputs).unwrap();
+            for (image, copy) in images.iter().chain([&output]).zip(&copies) {
+                let image_subresource =
+                    vk::ImageSubresourceLayers { aspect_mask: image.aspect, layer_count: 1, ..Default::default() };
+                let image_extent = vk::Extent3D { width: EXTENT[0], height: EXTENT[1], depth: 1 };
+                let region = [vk::BufferImageCopy { image_subresource, image_extent, ..Default::default() }];
+                gpu.device.cmd_copy_image_to_buffer(cmd, image.image, image.exit.layout, copy.buffer, &region);
+            }
+        }
+        ((), passband::Retired::default())
+    });
+    // The contents survived the transitions: the depth covers what the output covers.
+    let depth: Vec<f32> = bytemuck::pod_collect_to_vec(copies[0].bytes());
+    let output = copies[3].bytes().as_chunks::<4>().0;
+    assert!(depth.iter().zip(output).all(|(depth, texel)| (*depth > 0.0) == (texel[3] == 255)));
+    assert!(depth.iter().any(|depth| *depth > 0.0));
+    // SAFETY: as above.
+    copies.into_iter().for_each(|buffer| unsafe { buffer.free(&rig.gpu, &mut rig.memory) });
+    rig.destroy(renderer);
+    // SAFETY: as above.
+    unsafe {
+        targets.free(&rig.gpu, &mut rig.memory);
+        raster.free(&rig.gpu, &mut rig.memory);
+    }
+    assert_clean(&rig.close());
 }

@@ -148,10 +148,12 @@ impl Raster {
 impl Targets {
     pub fn new(gpu: &Gpu, memory: &mut dyn HostAllocator, raster: &Raster, extent: [u32; 2]) -> Result<Self, Box<dyn Error>> {
         use vk::ImageUsageFlags as U;
+        // Copied from for debugging only; the renderer samples them.
+        let sampled = U::SAMPLED | U::TRANSFER_SRC;
         let mut image = |format, usage| Image::new(gpu, memory, format, extent, usage);
-        let depth = image(DEPTH, U::DEPTH_STENCIL_ATTACHMENT | U::SAMPLED)?;
-        let normals = image(NORMALS, U::COLOR_ATTACHMENT | U::SAMPLED)?;
-        let ids = image(IDS, U::COLOR_ATTACHMENT | U::SAMPLED)?;
+        let depth = image(DEPTH, U::DEPTH_STENCIL_ATTACHMENT | sampled)?;
+        let normals = image(NORMALS, U::COLOR_ATTACHMENT | sampled)?;
+        let ids = image(IDS, U::COLOR_ATTACHMENT | sampled)?;
         let output = image(OUTPUT, U::STORAGE | U::TRANSFER_SRC)?;
         let kind = vk::DescriptorType::COMBINED_IMAGE_SAMPLER;
         let sizes = [vk::DescriptorPoolSize { ty: kind, descriptor_count: 3 }];

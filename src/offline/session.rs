@@ -178,7 +178,7 @@ impl Session {
     }
 
     /// Runs a compute module of the caller's own over the session's materials and environment: local size 64, set 1 the
-    /// material bridge, set 2 the frame uniform, the environment's map and alias table, `uvec4` input and `vec4` output; a
+    /// material bridge, set 2 the frame uniform, the environment's map and intervals, `uvec4` input and `vec4` output; a
     /// push constant holds the number of entries. Entry i of the result is output i.
     ///
     /// # Errors

@@ -1,4 +1,5 @@
-//! Pass 0a: the distant environment, uploaded on change: radiance and sampling density in one image, alias table in another.
+//! Pass 0a: the distant environment, uploaded on change: radiance and sampling density in one image, what
+//! directions are drawn from in another.
 
 use crate::error::{Error, Result};
 use crate::gpu::access::Access;
@@ -17,57 +18,55 @@ pub const NAME: &str = "environment";
 pub(crate) struct EnvironmentImages {
     /// RGBA32F: radiance; density over uv.
     pub map: Image,
-    /// RG32UI: threshold as float bits; alias as row << 16 | column.
-    pub alias: Image,
+    /// RG32UI: alias entries of every row's texels, and the rows' own entries.
+    pub entries: Image,
 }
 
 /// Created and filled, not yet recorded.
 pub(crate) struct EnvironmentUpload {
     map: ImageUpload,
-    alias: ImageUpload,
+    entries: ImageUpload,
 }
 
 impl EnvironmentUpload {
     pub fn new(build: &mut Build<'_>, map: &LatLong) -> Result<Self> {
-        if map.width() > 65535 || map.height() > 65535 {
-            let got = format!("{}x{}", map.width(), map.height());
-            return Err(Error::invalid("environment", "at most 65535 texels a side", got));
-        }
         // Its largest sum over texels must stay finite in 32 bits.
         let brightest = map.texels().iter().flatten().copied().fold(0.0, f32::max);
         if brightest > 1e30 {
             return Err(Error::invalid("environment radiance", "at most 1e30", brightest));
         }
         let importance = EnvironmentImportance::build(map)?;
-        let density = importance.density_texels();
-        let radiance: Vec<[f32; 4]> = map.texels().iter().zip(&density).map(|(&[r, g, b], &d)| [r, g, b, d]).collect();
-        let place = |texel: u32| ((texel / map.width()) << 16) | (texel % map.width());
-        let alias: Vec<[u32; 2]> = importance.alias().entries().iter().map(|e| [e.threshold.to_bits(), place(e.alias)]).collect();
-        let desc = |name, format| ImageDesc {
+        let radiance: Vec<[f32; 4]> =
+            map.texels().iter().zip(importance.density_texels()).map(|(&[r, g, b], density)| [r, g, b, density]).collect();
+        let (extent, entries) = importance.entries();
+        let desc = |name, format, [width, height]: [u32; 2]| ImageDesc {
             name,
             format,
-            extent: [map.width(), map.height(), 1],
+            extent: [width, height, 1],
             usage: vk::ImageUsageFlags::SAMPLED,
         };
+        let radiance_desc = desc("environment", vk::Format::R32G32B32A32_SFLOAT, [map.width(), map.height()]);
+        let entries_desc = desc("environment entries", vk::Format::R32G32_UINT, extent);
         Ok(Self {
-            map: ImageUpload::new(build, desc("environment", vk::Format::R32G32B32A32_SFLOAT), bytemuck::cast_slice(&radiance))?,
-            alias: ImageUpload::new(build, desc("environment alias", vk::Format::R32G32_UINT), bytemuck::cast_slice(&alias))?,
+            map: ImageUpload::new(build, radiance_desc, bytemuck::cast_slice(&radiance))?,
+            entries: ImageUpload::new(build, entries_desc, bytemuck::cast_slice(&entries))?,
         })
     }
 
     pub fn record(self, rec: &mut Recorder<'_>, bag: &mut Retired) -> EnvironmentImages {
-        EnvironmentImages { map: self.map.record(rec, bag), alias: self.alias.record(rec, bag) }
+        EnvironmentImages { map: self.map.record(rec, bag), entries: self.entries.record(rec, bag) }
     }
 }
 
 impl EnvironmentImages {
     /// Declares both images sampled by the pass that is open.
     pub fn sampled(&self, rec: &mut Recorder<'_>) {
-        [&self.map, &self.alias].into_iter().for_each(|image| rec.image(image, Access::COMPUTE_SAMPLED));
+        rec.image(&self.map, Access::COMPUTE_SAMPLED);
+        rec.image(&self.entries, Access::COMPUTE_SAMPLED);
     }
 
     pub fn retire(self, states: &mut States, bag: &mut Retired) {
-        for image in [self.map, self.alias] {
+        for image in [self.map, self.entries] {
             states.forget(image.handle);
             image.retire(bag);
         }
