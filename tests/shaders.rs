@@ -318,7 +318,7 @@ fn a_pass_that_binds_otherwise_is_found() {
         row.bindings[map].2 = std::mem::replace(&mut row.bindings[arguments].2, kind);
     });
     assert!(swapped.contains("set 2 binding 1: Rust STORAGE_BUFFER") && swapped.contains("set 2 binding 3: Rust"), "{swapped}");
-    assert!(shade(|row| row.push_constant_bytes = 4).contains("push constants: Rust 4 bytes, shader 8"));
+    assert!(shade(|row| row.push_constant_bytes += 4).contains("shade.comp: push constants: Rust"));
     assert!(shade(|row| row.bindings.retain(|b| b.0 != 1)).contains("set 1 binding 0: not in Rust"));
 }
 
