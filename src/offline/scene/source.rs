@@ -56,6 +56,11 @@ impl Source {
         Error::NotSupportedYet { what: format!("{place} {}", self.field(span)) }
     }
 
+    /// That the scene lacks the key `name` at its top.
+    pub(super) fn missing(&self, name: &str) -> Error {
+        self.error_of(&(0..0), name.to_string(), "a value", "none")
+    }
+
     fn error_of(&self, span: &Span, field: String, expected: impl Into<String>, got: impl ToString) -> Error {
         match self.override_at(span) {
             Some(path) if field.is_empty() => Error::argument(format!("--set {path}"), expected, got),
