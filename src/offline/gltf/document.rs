@@ -37,7 +37,7 @@ impl<'a> Document<'a> {
                 let expected = format!("12 to {}", content.len());
                 return Err(Error::file(path, At::Byte(8), "GLB length", expected, length));
             }
-            let glb = gltf::Glb::from_slice(&content).map_err(fail)?;
+            let glb = gltf::Glb::from_slice(content.get(..length as usize).unwrap_or_default()).map_err(fail)?;
             (glb.json.into_owned(), glb.bin.map(|bin| Arc::new(bin.into_owned())))
         } else {
             (content, None)
@@ -46,6 +46,9 @@ impl<'a> Document<'a> {
             let at = if blob.is_none() { At::Line(e.line() as u64) } else { At::File };
             Error::file(path, at, "glTF JSON", "a well-formed document", e)
         })?;
+        if !root.asset.version.starts_with("2.") {
+            return Err(Error::file(path, At::File, "asset.version", "2.0", &root.asset.version));
+        }
         // The crate's validation looks positions up before it has checked their index.
         for (m, mesh) in root.meshes.iter().enumerate() {
             for (p, primitive) in mesh.primitives.iter().enumerate() {

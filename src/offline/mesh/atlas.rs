@@ -125,3 +125,90 @@ impl Unwrapped {
         fits.then(|| Self { sources: sources.to_vec(), uvs, indices: indices.to_vec() })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::offline::builtin;
+    use crate::offline::mesh::Projection;
+    use glam::{Vec2, Vec3};
+
+    /// Pixels of a coarse raster whose centres two triangles cover (edges, with a margin, count for neither), and the part
+    /// of the square that is covered at all.
+    fn overlaps(mesh: &Mesh) -> (usize, f64) {
+        const SIDE: usize = 512;
+        let mut counts = vec![0_u8; SIDE * SIDE];
+        for t in mesh.indices.as_chunks::<3>().0 {
+            let [a, b, c] = t.map(|i| Vec2::from(mesh.uvs[i as usize]) * SIDE as f32);
+            let (low, high) = (a.min(b).min(c).floor(), a.max(b).max(c).ceil());
+            for y in low.y as usize..(high.y as usize).min(SIDE) {
+                for x in low.x as usize..(high.x as usize).min(SIDE) {
+                    let p = Vec2::new(x as f32 + 0.5, y as f32 + 0.5);
+                    let inside = |a: Vec2, b: Vec2| (b - a).perp_dot(p - a) > 1e-3 * (b - a).length();
+                    if inside(a, b) && inside(b, c) && inside(c, a) {
+                        counts[y * SIDE + x] += 1;
+                    }
+                }
+            }
+        }
+        let covered = counts.iter().filter(|n| **n > 0).count() as f64 / counts.len() as f64;
+        (counts.iter().filter(|n| **n > 1).count(), covered)
+    }
+
+    #[test]
+    fn charts_do_not_overlap_and_keep_triangles() {
+        for name in ["torus-knot", "bumpy-sphere"] {
+            let source = builtin::mesh(name, 32).unwrap();
+            let mut mesh = source.clone();
+            mesh.generate_uvs(Projection::Atlas, None).unwrap();
+            assert!(mesh.is_consistent() && mesh.uvs.iter().flatten().all(|c| (0.0..=1.0).contains(c)));
+            let (twice, covered) = overlaps(&mesh);
+            assert!(twice == 0 && covered > 0.3, "{name}: {twice} {covered}");
+            let mut ratios = Vec::new();
+            for (new, old) in mesh.indices.as_chunks::<3>().0.iter().zip(source.indices.as_chunks::<3>().0) {
+                let [a, b, c] = new.map(|i| mesh.positions[i as usize]);
+                assert_eq!([a, b, c], old.map(|i| source.positions[i as usize]), "{name}");
+                let [p, q, r] = new.map(|i| Vec2::from(mesh.uvs[i as usize]));
+                let area = (Vec3::from(b) - Vec3::from(a)).cross(Vec3::from(c) - Vec3::from(a)).length();
+                ratios.push((q - p).perp_dot(r - p) / area);
+            }
+            // No triangle is mirrored, and areas are even but for what curvature asks.
+            ratios.sort_by(f32::total_cmp);
+            assert!(
+                ratios[0] > 0.0 && ratios[ratios.len() - 1] / ratios[0] < 16.0,
+                "{name} {} {}",
+                ratios[0],
+                ratios[ratios.len() - 1]
+            );
+        }
+    }
+
+    #[test]
+    fn entries_are_used_and_damaged_ones_replaced() {
+        let folder = tempfile::tempdir().unwrap();
+        let cache = folder.path().join("deep").join("cache");
+        let source = builtin::mesh("bumpy-sphere", 8).unwrap();
+        let fresh = unwrap(&source, Some(&cache)).unwrap();
+        let entry = cache.join(format!("{}.atlas", key(&source)));
+        let kept = std::fs::read(&entry).unwrap();
+        // A valid entry of other content is believed: it is read, not computed.
+        let mut other = Unwrapped::from_bytes(&kept, &source).unwrap();
+        other.uvs[0] = [0.25, 0.75];
+        std::fs::write(&entry, other.to_bytes()).unwrap();
+        assert_eq!(unwrap(&source, Some(&cache)).unwrap().uvs[0], [0.25, 0.75]);
+        other.indices[0] = u32::MAX;
+        let mut flipped = kept.clone();
+        flipped[100] ^= 1;
+        for damaged in [vec![], kept[..kept.len() / 2].to_vec(), flipped, other.to_bytes(), vec![0; 40]] {
+            std::fs::write(&entry, damaged).unwrap();
+            assert_eq!(unwrap(&source, Some(&cache)).unwrap().uvs, fresh.uvs);
+            assert_eq!(std::fs::read(&entry).unwrap(), kept, "rewritten");
+        }
+        assert_eq!(std::fs::read_dir(&cache).unwrap().count(), 1, "nothing else is left there");
+        // Another mesh has another name; a folder that cannot be does not matter.
+        let mut moved = source.clone();
+        moved.positions[0][0] += 0.001;
+        assert_ne!(key(&moved), key(&source));
+        assert_eq!(unwrap(&source, Some(&entry)).unwrap().uvs, fresh.uvs);
+    }
+}

@@ -83,3 +83,71 @@ impl Geometry for Work<'_> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::offline::builtin;
+    use glam::{Vec2, Vec4};
+
+    /// Each tangent is a unit vector across its normal; with the handedness it follows the gradients of `u` and `v`, averaged
+    /// over the vertex's triangles, to within the cosine `least`; of `v`, which need not be across `u`, to within `least_v`.
+    fn assert_follows(mesh: &Mesh, least: f32, least_v: f32) {
+        assert!(mesh.is_consistent() && mesh.tangents.len() == mesh.positions.len());
+        for t in mesh.indices.as_chunks::<3>().0 {
+            let [a, b, c] = t.map(|i| Vec3::from(mesh.positions[i as usize]));
+            let [p, q, r] = t.map(|i| Vec2::from(mesh.uvs[i as usize]));
+            let (e, f) = (q - p, r - p);
+            let area = e.perp_dot(f);
+            let (along_u, along_v) = (((b - a) * f.y - (c - a) * e.y) / area, ((c - a) * e.x - (b - a) * f.x) / area);
+            for i in t.map(|i| i as usize) {
+                let (tangent, normal) = (Vec4::from(mesh.tangents[i]), Vec3::from(mesh.normals[i]));
+                let (direction, sign) = (tangent.truncate(), tangent.w);
+                assert!((direction.length() - 1.0).abs() < 1e-4 && direction.dot(normal).abs() < 1e-4, "{tangent} {normal}");
+                assert!(direction.dot(along_u.normalize()) > least, "{tangent} {along_u}");
+                assert!((normal.cross(direction) * sign).dot(along_v.normalize()) > least_v, "{tangent} {along_v}");
+                assert_eq!(sign, area.signum());
+            }
+        }
+    }
+
+    #[test]
+    fn tangents_follow_the_coordinates() {
+        // The knot's tube turns as it goes: there the coordinates are sheared.
+        for (name, least, least_v) in [("plane", 0.9999, 0.9999), ("cloth", 0.99, 0.98), ("torus-knot", 0.95, 0.2)] {
+            let mut mesh = builtin::mesh(name, 128).unwrap();
+            mesh.compute_tangents();
+            assert_follows(&mesh, least, least_v);
+        }
+    }
+
+    #[test]
+    fn mirrored_halves_split_the_vertices_between_them() {
+        let mut mesh = builtin::mesh("plane", 64).unwrap();
+        for uv in &mut mesh.uvs {
+            uv[0] = (uv[0] - 0.5).abs();
+        }
+        let before = mesh.positions.len();
+        mesh.compute_tangents();
+        // 4 by 4 cells: the middle column of 5 vertices is there twice.
+        assert_eq!((before, mesh.positions.len()), (25, 30));
+        assert_follows(&mesh, 0.9999, 0.9999);
+        assert!(mesh.tangents.iter().any(|t| t[3] < 0.0) && mesh.tangents.iter().any(|t| t[3] > 0.0));
+    }
+
+    #[test]
+    fn without_coordinates_there_are_none_and_degenerate_ones_still_have_a_frame() {
+        let mut mesh = builtin::mesh("plane", 32).unwrap();
+        mesh.has_uvs = false;
+        mesh.compute_tangents();
+        assert!(mesh.tangents.is_empty());
+        mesh.has_uvs = true;
+        mesh.uvs.fill([0.5; 2]);
+        mesh.compute_tangents();
+        assert_eq!(mesh.tangents.len(), mesh.positions.len());
+        for (t, n) in mesh.tangents.iter().zip(&mesh.normals) {
+            let t = Vec4::from(*t);
+            assert!((t.truncate().length() - 1.0).abs() < 1e-5 && t.truncate().dot(Vec3::from(*n)).abs() < 1e-5, "{t}");
+        }
+    }
+}

@@ -118,3 +118,86 @@ fn boxed(mesh: &Mesh) -> impl Fn([DVec3; 3], [DVec3; 3]) -> [DVec2; 3] {
         })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::offline::builtin;
+    use glam::{Vec2, Vec3};
+
+    /// Twice the signed areas in texture space, and the triangles' normals.
+    fn areas(mesh: &Mesh) -> Vec<(f32, Vec3)> {
+        let triangle = |t: &[u32; 3]| {
+            let [a, b, c] = t.map(|i| Vec2::from(mesh.uvs[i as usize]));
+            let [p, q, r] = t.map(|i| Vec3::from(mesh.positions[i as usize]));
+            ((b - a).perp_dot(c - a), (q - p).cross(r - p))
+        };
+        mesh.indices.as_chunks::<3>().0.iter().map(triangle).collect()
+    }
+
+    /// A sphere without the seam and pole vertices of the built-in one.
+    fn welded() -> Mesh {
+        let mut mesh = builtin::mesh("sphere", 64).unwrap();
+        let mut first = std::collections::HashMap::new();
+        let key = |p: &[f32; 3]| p.map(|c| (c * 1e4).round() as i32);
+        let indices = mesh.indices.iter().map(|i| *first.entry(key(&mesh.positions[*i as usize])).or_insert(*i)).collect();
+        mesh.indices = indices;
+        (mesh.has_uvs, mesh.uvs) = (false, vec![[0.0; 2]; mesh.positions.len()]);
+        mesh
+    }
+
+    #[test]
+    fn spherical_coordinates_are_the_built_in_ones_without_a_smear_at_the_seam() {
+        let mut mesh = welded();
+        mesh.generate_uvs(Projection::Spherical, None).unwrap();
+        assert!(mesh.has_uvs && mesh.is_consistent());
+        for (area, _) in areas(&mesh) {
+            assert!(area > 0.0 && area < 2.0 / 64.0 * 2.0 / 32.0, "{area}");
+        }
+        for (p, uv) in mesh.positions.iter().zip(&mesh.uvs) {
+            let [x, y, z] = p.map(f64::from);
+            assert!((f64::from(uv[1]) - (1.0 - y.clamp(-1.0, 1.0).acos() / PI)).abs() < 1e-3, "{p:?} {uv:?}");
+            if x.hypot(z) > 0.01 {
+                let off = f64::from(uv[0]) - (0.5 + x.atan2(z) / TAU);
+                assert!((off - off.round()).abs() < 1e-5, "{p:?} {uv:?}");
+            }
+            assert!((0.0..=1.04).contains(&uv[0]) && (0.0..=1.0).contains(&uv[1]), "{uv:?}");
+        }
+        // Together the triangles cover the square once, but for half a triangle in every column at both poles.
+        let covered: f32 = areas(&mesh).iter().map(|(area, _)| area / 2.0).sum();
+        assert!((covered - (1.0 - 1.0 / 32.0)).abs() < 1e-3, "{covered}");
+    }
+
+    #[test]
+    fn box_coordinates_have_one_scale_and_split_where_the_axis_changes() {
+        let mut mesh = welded();
+        let before = mesh.positions.len();
+        mesh.generate_uvs(Projection::Box, None).unwrap();
+        assert!(mesh.is_consistent() && mesh.positions.len() != before);
+        assert!(mesh.uvs.iter().flatten().all(|c| (-1e-6..=1.000001).contains(c)));
+        for (area, normal) in areas(&mesh) {
+            // The projection along the greatest component, over a side of 2, never mirrored.
+            let expected = normal.abs().max_element() / 4.0;
+            assert!((area - expected).abs() < 1e-3 * expected + 1e-7, "{area} {expected} {normal}");
+        }
+    }
+
+    #[test]
+    fn what_has_no_extent_still_gets_finite_coordinates() {
+        for projection in [Projection::Spherical, Projection::Box, Projection::Atlas] {
+            for positions in [vec![[1.0; 3]; 3], vec![[0.0; 3], [0.0, 1.0, 0.0], [0.0, 2.0, 0.0]]] {
+                let attributes = (vec![[0.0, 1.0, 0.0]; 3], vec![[0.0; 2]; 3]);
+                let indices = vec![0, 1, 2];
+                let mut mesh = Mesh { positions, normals: attributes.0, uvs: attributes.1, indices, ..Default::default() };
+                match mesh.generate_uvs(projection, None) {
+                    Ok(()) => assert!(mesh.uvs.iter().flatten().all(|c| c.is_finite()), "{projection:?} {:?}", mesh.uvs),
+                    Err(e) => assert_eq!(projection, Projection::Atlas, "{e}"),
+                }
+                mesh.compute_tangents();
+                assert!(mesh.tangents.iter().flatten().all(|c| c.is_finite()));
+            }
+        }
+        let mut broken = Mesh { indices: vec![0, 1, 2], ..Default::default() };
+        assert!(broken.generate_uvs(Projection::Box, None).is_err());
+    }
+}
