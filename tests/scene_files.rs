@@ -423,7 +423,9 @@ fn builtin_scenes_resolve() {
     }
     let trio = Scene::load("trio", &[("objects.2.material".into(), "paint".into())]).unwrap().resolve().unwrap();
     assert_eq!(trio.materials[trio.objects[2].material].name, "paint");
-    // The one that needs fetched files parses, and says which is missing.
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/bunny-city.toml");
-    load(&path, &[]).unwrap();
+    // Those that need fetched files parse.
+    for name in ["bunny-city", "dragon", "armadillo"] {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("scenes/{name}.toml"));
+        load(&path, &[]).unwrap();
+    }
 }

@@ -15,7 +15,7 @@ pub(super) fn scene(source: &Source, file: &SceneFile) -> Result<()> {
     match &file.camera {
         Some(camera) => check.camera(camera)?,
         None if file.objects.get_ref().iter().any(|object| object.get_ref().is_gltf()) => {}
-        None => return Err(source.missing("camera")),
+        None => return Err(source.missing(&(0..0), "camera", "a table, unless a glTF mesh has a camera")),
     }
     if let Some(environment) = &file.environment {
         check.environment(environment)?;
@@ -88,7 +88,7 @@ impl Check<'_> {
         self.each(&o.builtin, |c, v| c.name(v, &builtin::MESHES))?;
         match &o.material {
             None if o.is_gltf() => {}
-            None => return Err(self.source.error(&object.span(), "a material, unless the mesh is glTF", "none")),
+            None => return Err(self.source.missing(&object.span(), "material", "a name, unless the mesh is glTF")),
             Some(name) if file.materials.contains_key(name.get_ref()) => {}
             Some(name) => {
                 let names: Vec<_> = file.materials.keys().map(String::as_str).collect();

@@ -46,7 +46,8 @@ pub(super) fn world(scene: &Scene) -> Result<World> {
         }
     }
     let own = file.camera.as_ref().map(camera);
-    let Some(camera) = own.or(file_camera) else { return Err(scene.source.missing("camera")) };
+    let none = || scene.source.missing(&(0..0), "camera", "a table, as no glTF mesh has a perspective camera");
+    let camera = own.or(file_camera).ok_or_else(none)?;
     Ok(World {
         name: scene.name.clone(),
         camera,

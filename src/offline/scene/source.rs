@@ -56,9 +56,10 @@ impl Source {
         Error::NotSupportedYet { what: format!("{place} {}", self.field(span)) }
     }
 
-    /// That the scene lacks the key `name` at its top.
-    pub(super) fn missing(&self, name: &str) -> Error {
-        self.error_of(&(0..0), name.to_string(), "a value", "none")
+    /// That the table at `span` lacks the key `name`; an empty span is the whole file.
+    pub(super) fn missing(&self, span: &Span, name: &str, expected: &str) -> Error {
+        let field = if span.is_empty() { String::new() } else { self.field(span) + "." };
+        self.error_of(span, field + name, expected, "none")
     }
 
     fn error_of(&self, span: &Span, field: String, expected: impl Into<String>, got: impl ToString) -> Error {
