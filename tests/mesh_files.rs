@@ -330,7 +330,7 @@ fn malformed_ply_is_refused() {
         assert!(message.len() < 600, "{message}");
     }
     let e = read_as("m.ply", whole.replace("-1 0 1 7", "x 0 1 7").as_bytes()).unwrap_err();
-    assert!(matches!(e, Error::File { at: At::Line(20), .. }), "{e}");
+    assert!(matches!(e, Error::File { at: At::Line(21), .. }), "{e}");
     // A binary list that claims 4 billion indices, and an element whose entries take no bytes at all.
     let header = "ply\nformat binary_little_endian 1.0\nelement face 1\nproperty list uint int vertex_indices\nend_header\n";
     let e = read_as("m.ply", &[header.as_bytes(), &[255; 40]].concat()).unwrap_err();
@@ -370,4 +370,28 @@ fn damaged_ply_and_off_never_panic() {
             assert!(matches!(e, Error::File { at: At::File, .. }), "{e}");
         }
     }
+}
+
+/// The `uv` key of a scene reaches the mesh, also where two objects ask one file for different coordinates.
+#[test]
+fn scenes_generate_coordinates() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("m.off"), pyramid_off()).unwrap();
+    let object = |uv: &str| format!("[[objects]]\nmesh = 'm.off'\nmaterial = 'grey'\n{uv}\n");
+    let scene = folder.path().join("s.toml");
+    let text = format!(
+        "[camera]\nposition = [0, 0, 3]\n{}{}{}{}[materials.grey]\nreflectance = {{ ggx = {{ alpha = 0.5, f0 = 0.04, albedo = 0.2 }} }}\n",
+        object(""),
+        object("uv = 'spherical'"),
+        object("uv = 'box'"),
+        object("uv = 'spherical'")
+    );
+    std::fs::write(&scene, text).unwrap();
+    let world = passband::offline::scene::Scene::load(scene.to_str().unwrap(), &[]).unwrap().resolve().unwrap();
+    let meshes: Vec<&Mesh> = world.objects.iter().map(|o| &*o.mesh).collect();
+    assert_eq!(meshes.iter().map(|m| m.has_uvs).collect::<Vec<_>>(), [false, true, true, true]);
+    // Each of the five faces has an axis of its own: the base's corners get 3, 3, 2 and 2 different coordinates, the tip 1.
+    assert_eq!((meshes[0].positions.len(), meshes[2].positions.len()), (5, 11));
+    assert!(std::sync::Arc::ptr_eq(&world.objects[1].mesh, &world.objects[3].mesh));
+    meshes.iter().for_each(|mesh| assert_outward(mesh));
 }

@@ -38,7 +38,7 @@ pub struct Mesh {
 }
 
 /// Reads a mesh in the format of `path`'s extension: `.obj`, `.ply`, `.off`, or `.glb` and `.gltf` with all their
-/// primitives as one mesh. Each may end in `.gz` (a `.gltf` then holds its buffers inside).
+/// primitives as one mesh. Each may end in `.gz`; files that a `.gltf` names are read as they are.
 ///
 /// # Errors
 /// [`Error::Argument`] for another extension, [`Error::File`] for a file that is not such a mesh: malformed, damaged, with

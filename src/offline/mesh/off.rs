@@ -19,11 +19,14 @@ pub(super) fn parse(path: &Path, bytes: &[u8]) -> Result<Mesh> {
     let content = text.lines().zip(1..).map(|(line, at)| (line.split('#').next().unwrap_or_default().trim(), at));
     let mut lines = content.filter(|(line, _)| !line.is_empty());
     let last = text.lines().count() as u64;
-    let fail = |at: u64, field: &str, expected: &str, got: &str| Err(Error::file(path, At::Line(at), field, expected, got));
+    let fail = |at: u64, field: &str, expected: &str, got: &str| {
+        let got: String = got.chars().take(80).collect();
+        Err(Error::file(path, At::Line(at), field, expected, got))
+    };
 
     let (first, at) = lines.next().unwrap_or_default();
     let Some(rest) = first.strip_prefix("OFF").filter(|rest| rest.is_empty() || rest.starts_with(char::is_whitespace)) else {
-        return fail(at.max(1), "OFF", "the word OFF, and no other variant", first.get(..20).unwrap_or(first));
+        return fail(at.max(1), "OFF", "the word OFF, and no other variant", first);
     };
     let (counts, at) = if rest.trim().is_empty() { lines.next().unwrap_or(("", last)) } else { (rest, at) };
     let numbers: Vec<Option<u64>> = counts.split_whitespace().map(|n| n.parse().ok()).collect();

@@ -17,7 +17,7 @@ pub(super) fn parse(path: &Path, bytes: &[u8]) -> Result<Mesh> {
     let mut reader = Reader::new(bytes);
     let header = Parser::<Other>::new().read_header(&mut reader).map_err(|e| {
         let at = e.line().map_or(At::File, |line| At::Line(line as u64));
-        Error::file(path, at, "PLY header", "a well-formed header", e)
+        Error::file(path, at, "PLY header", "a well-formed header", excerpt(&e))
     })?;
     let mut file = File { path, size: bytes.len(), reader, header: &header };
     let (mut vertices, mut faces) = (Vec::new(), Vec::new());
@@ -69,6 +69,11 @@ fn described(index: &u32) -> String {
     if *index == NO_INDEX { "one that is negative or too large".into() } else { index.to_string() }
 }
 
+/// The parser's word, which may quote a line of any length.
+fn excerpt(e: &ParseError) -> String {
+    e.to_string().chars().take(200).collect()
+}
+
 /// A file whose header has been read.
 struct File<'a> {
     path: &'a Path,
@@ -92,8 +97,7 @@ impl File<'_> {
         Parser::new().read_payload_for_element(&mut self.reader, element, self.header).map_err(|e: ParseError| {
             let byte = At::Byte((self.size - self.reader.get_ref().len()) as u64);
             let at = if binary { byte } else { e.line().map_or(byte, |line| At::Line(line as u64)) };
-            let got: String = e.to_string().chars().take(200).collect();
-            Error::file(self.path, at, format!("element {}", element.name), "what the header declares", got)
+            Error::file(self.path, at, format!("element {}", element.name), "what the header declares", excerpt(&e))
         })
     }
 }
