@@ -1,12 +1,18 @@
 // The accessors through which every pass reads materials. A host with its own reflectance replaces this file.
-// Local frame: z is the normal, the viewer is in the half plane y = 0, x >= 0.
+// Local frame: z is the normal, the viewer is in the half plane y = 0, x >= 0. Kinds that are not isotropic turn it into the
+// surface's tangent frame.
 #ifndef BRIDGE_MATERIALS_GLSL
 #define BRIDGE_MATERIALS_GLSL
 #include "half_vector.glsl"
 #include "ggx.glsl"
+#include "blinn_phong.glsl"
+#include "cavity.glsl"
 
 const uint REFLECTANCE_TABLE = 0u;
 const uint REFLECTANCE_GGX = 1u;
+const uint REFLECTANCE_BLINN_PHONG = 2u;
+const uint REFLECTANCE_VMF = 3u;
+const uint REFLECTANCE_TURNED = 4u;
 
 // Table resolution (MERL) and importance table layout (src/reflectance/importance.rs).
 const vec3 TABLE_SIZE = vec3(180.0, 90.0, 90.0); // phi_d, theta_d, theta_h
@@ -15,10 +21,15 @@ const uint IMPORTANCE_ROWS = 64u;
 const uint IMPORTANCE_COLUMNS = 16u;
 const vec2 DENSITY_SIZE = vec2(16.0, 64.0); // cos(phi_h), warped theta_h
 
+// By kind:           table               GGX              Blinn-Phong         vMF                turned tables
+//   kind.yz          place in the atlas                                       first lobe, lobes  first table, tables
+//   f0               -                   F0; alpha        specular; exponent  -                  x: tables per radian
+//   albedo           w: scale            albedo           albedo              -                  w: scale
+// A lobe is a record of its own: mean direction and concentration in f0, its density at the centre in albedo.x.
 struct MaterialRecord {
-    uvec4 kind;  // reflectance kind, table's place in the atlas (theta_d, theta_h), unused
-    vec4 f0;     // rgb; alpha
-    vec4 albedo; // rgb; scale of the table's values
+    uvec4 kind;  // x: kind of reflectance
+    vec4 f0;
+    vec4 albedo;
 };
 
 layout(set = 1, binding = 0, std430) readonly buffer Materials {
@@ -34,27 +45,79 @@ struct Material {
     ivec2 cell;      // first texel of its importance cells for this view angle
     vec2 density;    // first texel of its density tile
     vec2 table;      // first texel of its table in y, z
+    vec2 turn;       // cosine and sine of the angle from the tangent frame's x axis to the local one
 };
 
-Material material_load(uint id, float cos_o) {
+// The tables are in the atlas row by row.
+vec2 material_table(uint slot) {
+    uint columns = uint(textureSize(reflectance_tables, 0).y) / uint(TABLE_SIZE.y);
+    return vec2(slot % columns, slot / columns) * TABLE_SIZE.yz;
+}
+
+Material material_load(uint id, float cos_o, vec2 turn) {
     Material m;
     m.record = materials[id];
     uint angle = min(uint(acos_positive(clamp(cos_o, 0.0, 1.0)) * (2.0 * INV_PI * float(IMPORTANCE_ANGLES))), IMPORTANCE_ANGLES - 1u);
     m.cell = ivec2(angle * IMPORTANCE_COLUMNS, id * IMPORTANCE_ROWS);
     m.density = vec2(angle, id) * DENSITY_SIZE;
     m.table = vec2(m.record.kind.yz) * TABLE_SIZE.yz;
+    m.turn = turn;
     return m;
+}
+
+// For surfaces without tangents: the local frame stands for the tangent frame.
+Material material_load(uint id, float cos_o) {
+    return material_load(id, cos_o, vec2(1.0, 0.0));
+}
+
+// One table's entry for directions above the horizon, h their half vector; without its scale.
+vec3 material_table_value(vec2 table, vec3 wi, vec3 wo, vec3 h) {
+    vec2 c = vec2(acos_positive(clamp(dot(wo, h), 0.0, 1.0)) * (2.0 * INV_PI), half_warp(h)) * TABLE_SIZE.yz;
+    c = clamp(c, vec2(0.5), TABLE_SIZE.yz - 0.5) + table;
+    vec3 at = vec3(difference_turn(wi, h), c / vec2(textureSize(reflectance_tables, 0).yz));
+    return textureLod(reflectance_tables, at, 0.0).rgb;
+}
+
+// Tables over the half vector's azimuth (src/reflectance/turned.rs), t in the tangent frame.
+vec3 material_turned_value(Material m, vec3 wi, vec3 wo, vec3 h, vec3 t) {
+    int count = int(m.record.kind.z);
+    float x = atan_full(t.y, t.x) * m.record.f0.x;
+    float first = floor(x);
+    // At most one round of the circle below zero.
+    int node = (int(first) + 64 * count) % count;
+    vec3 a = material_table_value(material_table(m.record.kind.y + uint(node)), wi, wo, h);
+    vec3 b = material_table_value(material_table(m.record.kind.y + uint((node + 1) % count)), wi, wo, h);
+    return mix(a, b, x - first);
+}
+
+// Density of normals of a mixture of vMF lobes (src/reflectance/vmf.rs) at t in the tangent frame, in 1/sr.
+float material_vmf_distribution(Material m, vec3 t) {
+    float sum = 0.0;
+    for (uint i = 0u; i < m.record.kind.z; ++i) {
+        vec4 lobe = materials[m.record.kind.y + i].f0;
+        vec3 d = t - lobe.xyz;
+        sum += materials[m.record.kind.y + i].albedo.x * exp(-0.5 * lobe.w * dot(d, d));
+    }
+    return sum;
 }
 
 // BRDF in 1/sr for directions above the horizon, h their half vector.
 vec3 material_evaluate(Material m, vec3 wi, vec3 wo, vec3 h) {
-    if (m.record.kind.x == REFLECTANCE_GGX) {
-        return ggx_evaluate(m.record.f0.rgb, m.record.albedo.rgb, m.record.f0.a, wi, wo, h);
+    vec3 rgb = m.record.f0.rgb;
+    vec3 albedo = m.record.albedo.rgb;
+    switch (m.record.kind.x) {
+        case REFLECTANCE_GGX:
+            return ggx_evaluate(rgb, albedo, m.record.f0.a, wi, wo, h);
+        case REFLECTANCE_BLINN_PHONG:
+            return blinn_phong_evaluate(rgb, albedo, m.record.f0.a, wi, wo, h);
+        case REFLECTANCE_TABLE:
+            return material_table_value(m.table, wi, wo, h) * m.record.albedo.a;
     }
-    vec2 c = vec2(acos_positive(clamp(dot(wo, h), 0.0, 1.0)) * (2.0 * INV_PI), half_warp(h)) * TABLE_SIZE.yz;
-    c = clamp(c, vec2(0.5), TABLE_SIZE.yz - 0.5) + m.table;
-    vec3 at = vec3(difference_turn(wi, h), c / vec2(textureSize(reflectance_tables, 0).yz));
-    return textureLod(reflectance_tables, at, 0.0).rgb * m.record.albedo.a;
+    vec3 t = vec3(m.turn.x * h.x - m.turn.y * h.y, m.turn.y * h.x + m.turn.x * h.y, h.z);
+    if (m.record.kind.x == REFLECTANCE_VMF) {
+        return vec3(material_vmf_distribution(m, t) * cavity_masking(wi, wo, h));
+    }
+    return material_turned_value(m, wi, wo, h, t) * m.record.albedo.a;
 }
 
 // A half vector, and its density in 1/sr of h, from two 32-bit numbers (Bagher 2011, section 3.3).
