@@ -15,7 +15,7 @@ use std::sync::Arc;
 
 const PAIRS: u32 = 10_000;
 
-/// Relative tolerance; the worst of all kinds was measured to be 5e-4.
+/// Relative tolerance; the worst of all kinds was measured to be 6e-4, by the steepest lobe.
 const TOLERANCE: f64 = 1e-3;
 
 fn session(models: &[Model]) -> Session {
@@ -108,7 +108,9 @@ fn pair(i: u32) -> Option<(Vec3, Vec3, f32)> {
         let h = DVec3::new(theta.sin() * phi.cos(), theta.sin() * phi.sin(), theta.cos());
         2.0 * wo.dot(h) * h - wo
     };
-    (wi.z > 0.01).then(|| (wi.as_vec3(), wo.as_vec3(), (d * TAU) as f32))
+    // A half vector that single precision cannot tell from the normal has no azimuth.
+    let h = (wi + wo).normalize();
+    (wi.z > 0.01 && h.x.hypot(h.y) > 1e-4).then(|| (wi.as_vec3(), wo.as_vec3(), (d * TAU) as f32))
 }
 
 #[test]

@@ -73,8 +73,11 @@ Material material_load(uint id, float cos_o) {
 // One table's entry for directions above the horizon, h their half vector; without its scale.
 vec3 material_table_value(vec2 table, vec3 wi, vec3 wo, vec3 h) {
     vec2 c = vec2(acos_positive(clamp(dot(wo, h), 0.0, 1.0)) * (2.0 * INV_PI), half_warp(h)) * TABLE_SIZE.yz;
-    c = clamp(c, vec2(0.5), TABLE_SIZE.yz - 0.5) + table;
-    vec3 at = vec3(difference_turn(wi, h), c / vec2(textureSize(reflectance_tables, 0).yz));
+    vec2 size = vec2(textureSize(reflectance_tables, 0).yz);
+    // Rounding of the coordinate must not let the neighbouring table in, whose grazing entries may be a thousand times larger.
+    vec2 border = 0.5 + size * (1.0 / 4194304.0);
+    c = clamp(c, border, TABLE_SIZE.yz - border) + table;
+    vec3 at = vec3(difference_turn(wi, h), c / size);
     return textureLod(reflectance_tables, at, 0.0).rgb;
 }
 
