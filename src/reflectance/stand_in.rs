@@ -73,7 +73,7 @@ const ALL: &[StandIn] = &[
         name: "gloss-plastic",
         lobes: &[lobe(1.0, 0.045, DVec3::splat(0.042))],
         sheen: None,
-        albedo: DVec3::new(0.04, 0.16, 0.5),
+        albedo: DVec3::new(0.03, 0.12, 0.4),
     },
     StandIn {
         name: "satin",

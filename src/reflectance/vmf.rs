@@ -27,7 +27,8 @@ pub struct Lobe {
 /// `n . sum(w r) / sum(w)` with `r = (coth kappa - 1/kappa) mu`, so that the integral of D cos over the sphere is the sum of
 /// the weights, which thus is the reflectance; G is that of V-cavities (Torrance and Sparrow 1967). Grey. In general not
 /// isotropic. The part of a lobe below the horizon counts in the projected area: a lobe along the normal has 2 % too much
-/// energy at a concentration of 3, 36 % at 1.
+/// energy at a concentration of 3, 36 % at 1; and V-cavities keep energy for mixtures that are balanced about the normal, where
+/// others send more than their weight towards the side they lean to.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Vmf {
     lobes: Vec<Lobe>,
