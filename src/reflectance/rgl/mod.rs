@@ -22,13 +22,13 @@ pub const BAKED_NODES: usize = 16;
 #[derive(Clone, Debug)]
 pub struct Rgl {
     /// Density of normals over the square.
-    ndf: Grids,
+    ndf: Grids<f64>,
     /// Projected area of the microsurface over the incidence's square.
-    sigma: Grids,
+    sigma: Grids<f64>,
     /// Warp by the visible normals, by incidence (phi, theta).
     vndf: Warp,
-    /// What remains of each channel, over the warped square.
-    rgb: [Grids; 3],
+    /// What remains of the colour, over the warped square.
+    rgb: Grids<DVec3>,
     /// Whether `ndf` and `sigma` are factors; otherwise `rgb` is the value itself.
     jacobian: bool,
     isotropic: bool,
@@ -59,7 +59,7 @@ impl Rgl {
         let isotropic = phi.len() <= 2;
         let parts = if isotropic { 1 } else { parts(field("phi_i")?, &phi)? };
 
-        let plane = |name: &str| -> Result<Grids, DataError> {
+        let plane = |name: &str| -> Result<Grids<f64>, DataError> {
             let field = field(name)?;
             let [height, width] = shape(field, &[])?;
             Ok(grids(field, [width, height], vec![], field.floats()?)?)
@@ -74,11 +74,11 @@ impl Rgl {
 
         let [height, width] = shape(rgb, &[phi.len(), theta.len(), 3])?;
         let values = rgb.floats()?;
-        let channel = |c: usize| {
-            let planes = values.chunks_exact(width * height).skip(c).step_by(3).flatten().copied().collect();
-            grids(rgb, [width, height], vec![phi.clone(), theta.clone()], planes)
-        };
-        let rgb = [channel(0)?, channel(1)?, channel(2)?];
+        let colours = values.chunks_exact(3 * width * height).flat_map(|incidence| {
+            let channel = |c: usize| incidence.iter().skip(c * width * height).copied();
+            channel(0).zip(channel(1)).zip(channel(2)).take(width * height).map(|((r, g), b)| DVec3::new(r, g, b))
+        });
+        let rgb = grids(rgb, [width, height], vec![phi.clone(), theta.clone()], colours.collect())?;
         Ok(Self { ndf, sigma, vndf, rgb, jacobian, isotropic, parts })
     }
 
@@ -117,8 +117,7 @@ impl Reflectance for Rgl {
         let u_m = [u_theta(polar(m)), v - v.floor()];
         let incidence = [phi_i, theta_i];
         let s = self.vndf.invert(u_m, &incidence);
-        let [r, g, b] = &self.rgb;
-        let mut value = DVec3::new(r.value(s, &incidence), g.value(s, &incidence), b.value(s, &incidence));
+        let mut value = self.rgb.value(s, &incidence);
         if self.jacobian {
             let sigma = self.sigma.value([u_theta(theta_i), u_phi(phi_i)], &[]);
             value *= if sigma > 0.0 { self.ndf.value(u_m, &[]) / (4.0 * sigma) } else { 0.0 };
@@ -208,7 +207,12 @@ fn shape(field: &Field<'_>, leading: &[usize]) -> Result<[usize; 2], DataError> 
     }
 }
 
-fn grids(field: &Field<'_>, size: [usize; 2], axes: Vec<Vec<f64>>, values: Vec<f64>) -> Result<Grids, DataError> {
+fn grids<T: warp::Value>(
+    field: &Field<'_>,
+    size: [usize; 2],
+    axes: Vec<Vec<f64>>,
+    values: Vec<T>,
+) -> Result<Grids<T>, DataError> {
     let got = values.len();
     let fits = Grids::new(size, axes, values);
     fits.ok_or_else(|| DataError::new(&field.name, field.offset, "as many entries as its shape has", got))

@@ -2,20 +2,26 @@
 //! outermost nodes are on the border, bilinear between them, one grid for each combination of the parameters' nodes, linear
 //! between those.
 
+use std::ops::{Add, Mul};
+
+/// What a grid holds: numbers or colours.
+pub(super) trait Value: Copy + Default + Add<Output = Self> + Mul<f64, Output = Self> {}
+impl<T: Copy + Default + Add<Output = Self> + Mul<f64, Output = Self>> Value for T {}
+
 /// A family of grids, the parameters' first axis slowest, then rows (y), then columns (x).
 #[derive(Clone, Debug)]
-pub(super) struct Grids {
+pub(super) struct Grids<T> {
     /// Columns and rows, each at least 2.
     size: [usize; 2],
     /// Rising nodes of each parameter.
     axes: Vec<Vec<f64>>,
-    values: Vec<f64>,
+    values: Vec<T>,
 }
 
 /// A family of densities over the square that are turned into uniform ones, columns within rows.
 #[derive(Clone, Debug)]
 pub(super) struct Warp {
-    density: Grids,
+    density: Grids<f64>,
     /// `[slice][row][column]`: integral of the row up to the column.
     conditional: Vec<f64>,
     /// `[slice][row]`: integral up to the row.
@@ -25,9 +31,9 @@ pub(super) struct Warp {
 /// Up to four slices with their weights.
 type Slices = [(usize, f64); 4];
 
-impl Grids {
+impl<T: Value> Grids<T> {
     /// `None` unless sizes and count of values agree.
-    pub fn new(size: [usize; 2], axes: Vec<Vec<f64>>, values: Vec<f64>) -> Option<Self> {
+    pub fn new(size: [usize; 2], axes: Vec<Vec<f64>>, values: Vec<T>) -> Option<Self> {
         let slices = axes.iter().try_fold(1usize, |n, axis| n.checked_mul(axis.len()))?;
         let count = slices.checked_mul(size[0])?.checked_mul(size[1])?;
         let fits = size.iter().all(|&side| side >= 2) && slices > 0 && axes.len() <= 2 && values.len() == count;
@@ -53,8 +59,8 @@ impl Grids {
         slices
     }
 
-    fn at(&self, slice: usize, row: usize, column: usize) -> f64 {
-        self.values.get((slice * self.size[1] + row) * self.size[0] + column).copied().unwrap_or(0.0)
+    fn at(&self, slice: usize, row: usize, column: usize) -> T {
+        self.values.get((slice * self.size[1] + row) * self.size[0] + column).copied().unwrap_or_default()
     }
 
     /// The cell that holds a point of the square, and where in it.
@@ -70,17 +76,17 @@ impl Grids {
     }
 
     /// The value at `u` = (x, y) in the square.
-    pub fn value(&self, u: [f64; 2], parameters: &[f64]) -> f64 {
+    pub fn value(&self, u: [f64; 2], parameters: &[f64]) -> T {
         let ([column, row], [x, y]) = self.cell(u);
         let in_row = |slice, row| lerp(self.at(slice, row, column), self.at(slice, row, column + 1), x);
         let slices = self.slices(parameters).into_iter().filter(|s| s.1 > 0.0);
-        slices.map(|(slice, weight)| weight * lerp(in_row(slice, row), in_row(slice, row + 1), y)).sum()
+        slices.fold(T::default(), |sum, (slice, weight)| sum + lerp(in_row(slice, row), in_row(slice, row + 1), y) * weight)
     }
 }
 
 impl Warp {
     /// `None` if a slice has no integral above 0 or a negative value.
-    pub fn new(mut density: Grids) -> Option<Self> {
+    pub fn new(mut density: Grids<f64>) -> Option<Self> {
         if density.values.iter().any(|v| *v < 0.0) {
             return None;
         }
@@ -154,6 +160,6 @@ fn partial(a: f64, b: f64, x: f64) -> f64 {
     x * (a + 0.5 * x * (b - a))
 }
 
-fn lerp(a: f64, b: f64, t: f64) -> f64 {
-    a + (b - a) * t
+fn lerp<T: Value>(a: T, b: T, t: f64) -> T {
+    a * (1.0 - t) + b * t
 }
