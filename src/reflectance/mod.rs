@@ -6,6 +6,7 @@
 use glam::{DVec2, DVec3};
 use std::sync::Arc;
 
+pub mod analysis;
 pub mod bake;
 pub mod blinn_phong;
 mod cavity;

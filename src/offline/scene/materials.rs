@@ -23,7 +23,7 @@ impl Models {
     /// The model of a checked reflectance.
     pub(super) fn get(&mut self, scene: &Scene, keys: &Reflectance) -> Result<Model> {
         if let Some(file) = &keys.merl {
-            return self.shared(format!("file {}", file.get_ref()), || merl(scene, file.get_ref()).map(table));
+            return self.shared(format!("file {}", file.get_ref()), || read_merl(&scene.folder.join(file.get_ref())).map(table));
         }
         if let Some(name) = &keys.builtin {
             return self.shared(format!("built-in {}", name.get_ref()), || stand_in(scene, name).map(table));
@@ -62,25 +62,42 @@ fn table(table: MerlTable) -> Model {
     Model::Table(Arc::new(table))
 }
 
-fn merl(scene: &Scene, file: &str) -> Result<MerlTable> {
-    let path = scene.folder.join(file);
-    let bytes = input::read(&path)?;
-    MerlTable::from_bytes(&bytes).map_err(|e| Error::file(&path, At::Byte(e.offset), e.field, e.expected, e.got))
+/// The MERL table `path`.
+///
+/// # Errors
+/// [`Error::File`] with the byte offset of what is wrong.
+pub fn read_merl(path: &Path) -> Result<MerlTable> {
+    let bytes = input::read(path)?;
+    MerlTable::from_bytes(&bytes).map_err(|e| Error::file(path, At::Byte(e.offset), e.field, e.expected, e.got))
+}
+
+/// The RGL file `path`.
+///
+/// # Errors
+/// [`Error::File`] with the byte offset of what is wrong.
+pub fn read_rgl(path: &Path) -> Result<Rgl> {
+    let bytes = input::read(path)?;
+    Rgl::from_bytes(&bytes).map_err(|e| Error::file(path, At::Byte(e.offset), e.field, e.expected, e.got))
+}
+
+/// The row `name` of a CSV table of SGD parameters.
+///
+/// # Errors
+/// [`Error::File`] with the line of what is wrong.
+pub fn read_sgd(path: &Path, name: &str) -> Result<Sgd> {
+    let bytes = input::read(path)?;
+    sgd_table::find(&bytes, name).map_err(|e| Error::file(path, At::Line(e.line), e.field, e.expected, e.got))
 }
 
 /// An RGL file as the GPU shades it: one table if it is isotropic, tables over the azimuth if not.
 fn rgl(path: &Path) -> Result<Model> {
-    let bytes = input::read(path)?;
-    let rgl = Rgl::from_bytes(&bytes).map_err(|e| Error::file(path, At::Byte(e.offset), e.field, e.expected, e.got))?;
+    let rgl = read_rgl(path)?;
     Ok(if rgl.isotropic() { table(rgl.bake()) } else { Model::Turned(Arc::new(rgl.bake_turned()?)) })
 }
 
 fn sgd(scene: &Scene, keys: &Spanned<format::Sgd>) -> Result<Sgd> {
     if let (Some(table), Some(name)) = (&keys.get_ref().table, &keys.get_ref().name) {
-        let path = scene.folder.join(table.get_ref());
-        let bytes = input::read(&path)?;
-        return sgd_table::find(&bytes, name.get_ref())
-            .map_err(|e| Error::file(&path, At::Line(e.line), e.field, e.expected, e.got));
+        return read_sgd(&scene.folder.join(table.get_ref()), name.get_ref());
     }
     // The check has seen every parameter.
     let given = keys.get_ref().parameters();

@@ -130,12 +130,12 @@ impl Reflectance for Rgl {
         self.isotropic
     }
 
-    /// By quadrature over the turns, 32 a period.
+    /// By quadrature over the turns, 8 a period.
     fn mean_over_turns(&self, wi: DVec3, wo: DVec3) -> DVec3 {
         if self.isotropic {
             return self.evaluate(wi, wo);
         }
-        const TURNS: u32 = 32;
+        const TURNS: u32 = 8;
         let angle = |i: u32| TAU * (f64::from(i) + 0.5) / f64::from(TURNS * self.parts.min(2));
         let at = |i| {
             let turn = glam::DVec2::from_angle(angle(i));
