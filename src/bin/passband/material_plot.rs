@@ -46,7 +46,7 @@ type Drawn = std::result::Result<(), Box<dyn std::error::Error>>;
 fn draw(rgb: &mut [u8], title: &str, reflectance: &dyn Reflectance) -> Drawn {
     let root = BitMapBackend::with_buffer(rgb, SIZE).into_drawing_area();
     root.fill(&WHITE)?;
-    let root = root.titled(title, ("sans-serif", 34))?;
+    let root = root.margin(14, 0, 0, 0).titled(title, ("sans-serif", 34))?;
     let panels = root.split_evenly((2, 2));
     let [lobes_at, slice_at, image_at, energy_at] = panels.as_slice() else { return Err("the sheet has four panels".into()) };
     lobes(lobes_at, reflectance)?;
@@ -78,6 +78,7 @@ fn chart<'a, 'b>(
         .axis_desc_style(("sans-serif", 20))
         .x_desc(x.1)
         .y_desc(y.1)
+        .y_labels(DECADES as usize + 1)
         .y_label_formatter(y_label)
         .draw()?;
     Ok(chart)
@@ -108,7 +109,7 @@ fn logarithm(value: f64, top: f64) -> f64 {
 }
 
 fn power(y: &f64) -> String {
-    format!("1e{y:.0}")
+    format!("1e{}", y.round() as i32)
 }
 
 /// The range of a logarithmic axis below the largest of `values`.
@@ -146,7 +147,7 @@ fn slice(area: &Area<'_>, reflectance: &dyn Reflectance) -> Drawn {
     const DIFFERENCE: f64 = 5.0;
     let values: Vec<_> = (0..=900)
         .map(|i| {
-            let x = 9.0 * f64::from(i) / 900.0;
+            let x = 9.4 * f64::from(i) / 900.0;
             (x, at(reflectance, x * x, DIFFERENCE))
         })
         .collect();
@@ -155,7 +156,7 @@ fn slice(area: &Area<'_>, reflectance: &dyn Reflectance) -> Drawn {
     let mut chart = chart(
         area,
         "Highlight (theta_d = 5 degrees)",
-        (0.0..9.0, "theta_h, square root of degrees"),
+        (0.0..9.4, "theta_h, square root of degrees"),
         (range, "reflectance, 1/sr"),
         &power,
     )?;
@@ -168,9 +169,9 @@ fn slice(area: &Area<'_>, reflectance: &dyn Reflectance) -> Drawn {
 
 /// The slice across the plane of incidence, as colour.
 fn image(area: &Area<'_>, reflectance: &dyn Reflectance) -> Drawn {
-    let caption = "Slice phi_d = 90 degrees (white at 1/sr)";
+    let caption = "Slice phi_d = 90 degrees (white: 1 or more per sr)";
     let y = (0.0..90.0, "theta_d, degrees");
-    let mut chart = chart(area, caption, (0.0..9.5, "theta_h, square root of degrees"), y, &|y| format!("{y:.0}"))?;
+    let mut chart = chart(area, caption, (0.0..9.487, "theta_h, square root of degrees"), y, &|y| format!("{y:.0}"))?;
     let side = |i: usize, whole: f64| whole * i as f64 / CELLS as f64;
     let cells = (0..CELLS * CELLS).map(|cell| {
         let (i, j) = (cell % CELLS, cell / CELLS);
@@ -189,12 +190,12 @@ fn energy(area: &Area<'_>, reflectance: &dyn Reflectance) -> Drawn {
     let values: Vec<_> = (0..=11).map(|i| 8.0 * f64::from(i)).map(|degrees| (degrees, albedo(reflectance, degrees))).collect();
     let largest = values.iter().map(|p| p.1.max_element()).fold(1.0, f64::max);
     let y = (0.0..1.05 * largest, "share");
-    let caption = "Reflected share of light";
+    let caption = "Reflected share of light, by channel";
     let mut chart = chart(area, caption, (0.0..90.0, "viewer, degrees"), y, &|y| format!("{y:.1}"))?;
     chart.draw_series(LineSeries::new([(0.0, 1.0), (90.0, 1.0)], RGBColor(120, 120, 120)))?;
     for (c, (name, colour)) in CHANNELS.into_iter().enumerate() {
         let points = values.iter().map(|(x, rgb)| (*x, rgb.to_array()[c])).collect();
         curve(&mut chart, points, colour, name.into())?;
     }
-    legend(&mut chart, SeriesLabelPosition::LowerLeft)
+    Ok(())
 }
