@@ -62,7 +62,7 @@ impl Rgl {
         let plane = |name: &str| -> Result<Grids<f64>, DataError> {
             let field = field(name)?;
             let [height, width] = shape(field, &[])?;
-            Ok(grids(field, [width, height], vec![], field.floats()?)?)
+            grids(field, [width, height], vec![], field.floats()?)
         };
         let (ndf, sigma) = (plane("ndf")?, plane("sigma")?);
         let vndf = field("vndf")?;

@@ -65,14 +65,14 @@ impl<T: Value> Grids<T> {
 
     /// The cell that holds a point of the square, and where in it.
     fn cell(&self, u: [f64; 2]) -> ([usize; 2], [f64; 2]) {
-        let mut cell = ([0; 2], [0.0; 2]);
-        for axis in 0..2 {
-            let last = self.size[axis] - 2;
-            let x = u[axis].clamp(0.0, 1.0) * (last + 1) as f64;
-            cell.0[axis] = (x as usize).min(last);
-            cell.1[axis] = x - cell.0[axis] as f64;
-        }
-        cell
+        let along = |u: f64, side: usize| {
+            let last = side - 2;
+            let x = u.clamp(0.0, 1.0) * (last + 1) as f64;
+            let cell = (x as usize).min(last);
+            (cell, x - cell as f64)
+        };
+        let [(column, x), (row, y)] = [along(u[0], self.size[0]), along(u[1], self.size[1])];
+        ([column, row], [x, y])
     }
 
     /// The value at `u` = (x, y) in the square.
