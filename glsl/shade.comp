@@ -5,6 +5,7 @@
 #include "gbuffer.glsl"
 #include "materials.glsl"
 #include "environment.glsl"
+#include "lights.glsl"
 #include "sobol.glsl"
 #include "list.glsl"
 
@@ -15,6 +16,9 @@ const uint ESTIMATOR_MIS = 0u;
 const uint ESTIMATOR_BRDF = 1u;
 const uint ESTIMATOR_BRDF_RANDOM = 2u;
 const uint ESTIMATOR_LOOKUP = 3u;
+// Whether the frame has lights beside the environment. Without them their loops are compiled away: some devices run a
+// loop's body once, masked, even for no iteration.
+layout(constant_id = 1) const bool LOCAL_LIGHTS = false;
 
 layout(set = 2, binding = 3, std430) readonly buffer Arguments {
     uint groups_x, groups_y, groups_z;
@@ -24,10 +28,14 @@ layout(set = 2, binding = 4, std430) readonly buffer List {
     uint list[];
 };
 layout(set = 2, binding = 5, rgba32f) uniform writeonly image2D radiance;
+layout(set = 2, binding = 6, std430) readonly buffer Lights {
+    LightRecord lights[]; // exact ones first
+};
 
 layout(push_constant) uniform Push {
     uint brdf_samples;
     uint environment_samples;
+    uint light_samples; // for each area light
 } push;
 
 // The shading frame: z the normal, bent towards the viewer where it faces away; the viewer in the half plane y = 0, x >= 0.
@@ -62,8 +70,9 @@ vec3 to_world(Local f, vec3 w) {
     return f.x * w.x + f.y * w.y + f.z * w.z;
 }
 
-// Contribution of direction number i drawn from the reflectance.
-vec3 brdf_direction(Local f, Material m, uvec2 u) {
+// Contribution of a direction drawn from the reflectance, seen from world point p. The environment and every area light
+// weigh it against their own samples (balance heuristic, one light at a time: lights add up).
+vec3 brdf_contribution(Local f, Material m, vec3 p, uvec2 u) {
     vec4 h = material_sample(m, u);
     float cos_d = dot(f.view, h.xyz);
     vec3 wi = h.xyz * (2.0 * cos_d) - f.view;
@@ -72,28 +81,62 @@ vec3 brdf_direction(Local f, Material m, uvec2 u) {
     }
     vec3 w = to_world(f, wi);
     vec4 light = environment_lookup(w);
-    vec3 value = material_evaluate(m, wi, f.view, h.xyz) * light.rgb * wi.z;
+    vec3 value = material_evaluate(m, wi, f.view, h.xyz) * wi.z;
     float jacobian = 0.25 / cos_d;
-    if (ESTIMATOR != ESTIMATOR_MIS) {
-        return value / (h.w * jacobian * float(push.brdf_samples));
+    bool alone = ESTIMATOR != ESTIMATOR_MIS;
+    float weight_density = alone ? h.w : material_density(m, h.xyz);
+    float brdf = float(push.brdf_samples) * weight_density * jacobian;
+    float environment = alone ? 0.0 : float(push.environment_samples) * environment_per_steradian(light.a, length(w.xz));
+    vec3 sum = light.rgb / (brdf + environment);
+    for (uint i = 0u; LOCAL_LIGHTS && i < frame.lights.y; ++i) {
+        float density = light_density(lights[frame.lights.x + i], p, w);
+        float competing = alone ? 0.0 : float(push.light_samples) * density;
+        sum += density > 0.0 ? lights[frame.lights.x + i].power.rgb / (brdf + competing) : vec3(0.0);
     }
-    float smooth_density = material_density(m, h.xyz);
-    float brdf = float(push.brdf_samples) * smooth_density * jacobian;
-    float environment = float(push.environment_samples) * environment_per_steradian(light.a, length(w.xz));
-    return value * (smooth_density / (h.w * (brdf + environment)));
+    return value * sum * (weight_density / h.w);
 }
 
 // Contribution of a direction drawn from the environment.
-vec3 environment_direction(Local f, Material m, uvec2 u) {
-    EnvironmentSample s = environment_sample(u);
-    vec3 wi = vec3(dot(s.direction, f.x), dot(s.direction, f.y), dot(s.direction, f.z));
-    if (wi.z <= 0.0) {
+vec3 environment_contribution(Local f, Material m, uvec2 u) {
+    vec2 uv = environment_place(u);
+    vec4 w = environment_direction(uv);
+    vec3 wi = vec3(dot(w.xyz, f.x), dot(w.xyz, f.y), dot(w.xyz, f.z));
+    bool above = wi.z > 0.0;
+    // Where lanes run in lock step without masked loads, those below the horizon read one common place instead of scattered ones.
+    uv = above ? uv : vec2(0.0);
+    wi = above ? wi : vec3(0.0, 0.0, 1.0);
+    vec4 light = environment_fetch(uv);
+    vec3 h = normalize(wi + f.view);
+    float environment = float(push.environment_samples) * environment_per_steradian(light.a, w.w);
+    float brdf = float(push.brdf_samples) * material_density(m, h) * 0.25 / dot(f.view, h);
+    vec3 value = material_evaluate(m, wi, f.view, h) * light.rgb * wi.z / (brdf + environment);
+    return above ? value : vec3(0.0);
+}
+
+// Contribution of a direction drawn from an area light.
+vec3 light_contribution(Local f, Material m, vec3 p, LightRecord light, uvec2 u) {
+    vec3 w = light_sample(light, p, vec2(to_unit(u.x), to_unit(u.y)));
+    vec3 wi = vec3(dot(w, f.x), dot(w, f.y), dot(w, f.z));
+    float density = light_density(light, p, w);
+    if (wi.z <= 0.0 || density <= 0.0) {
         return vec3(0.0);
     }
     vec3 h = normalize(wi + f.view);
     float brdf = float(push.brdf_samples) * material_density(m, h) * 0.25 / dot(f.view, h);
-    vec3 value = material_evaluate(m, wi, f.view, h) * s.radiance * wi.z;
-    return value / (brdf + float(push.environment_samples) * s.density);
+    return material_evaluate(m, wi, f.view, h) * light.power.rgb * wi.z / (brdf + float(push.light_samples) * density);
+}
+
+// What the exact lights add.
+vec3 exact_lights(Local f, Material m, vec3 p) {
+    vec3 sum = vec3(0.0);
+    for (uint i = 0u; i < frame.lights.x; ++i) {
+        vec4 w = light_exact(lights[i], p);
+        vec3 wi = vec3(dot(w.xyz, f.x), dot(w.xyz, f.y), dot(w.xyz, f.z));
+        if (wi.z > 0.0) {
+            sum += material_evaluate(m, wi, f.view, normalize(wi + f.view)) * lights[i].power.rgb * (w.w * wi.z);
+        }
+    }
+    return sum;
 }
 
 // Reflectance and radiance in an arbitrary direction: no estimate, but the look-ups that every estimate is made of.
@@ -110,7 +153,9 @@ void main() {
     }
     uint entry = list[index];
     ivec2 p = ivec2(entry & 0xffffu, entry >> 16);
-    Local f = local_frame(gbuffer_normal(p), -normalize(frame_ray(p)));
+    vec3 ray = frame_ray(p);
+    Local f = local_frame(gbuffer_normal(p), -normalize(ray));
+    vec3 at = frame.eye.xyz + ray * gbuffer_depth(p);
     Material m = material_load(gbuffer_material(p), f.view.z);
 
     uint seed = hash(entry ^ hash(frame.sampling.x ^ hash(frame.sampling.y)));
@@ -124,13 +169,22 @@ void main() {
     }
     uvec2 seeds = sobol_seeds(seed);
     for (uint i = 0u; i < push.brdf_samples; ++i) {
-        sum += brdf_direction(f, m, ESTIMATOR == ESTIMATOR_BRDF_RANDOM ? random_point(i, seed) : sobol_point(i, seeds));
+        sum += brdf_contribution(f, m, at, ESTIMATOR == ESTIMATOR_BRDF_RANDOM ? random_point(i, seed) : sobol_point(i, seeds));
     }
     if (ESTIMATOR == ESTIMATOR_MIS) {
         seeds = sobol_seeds(seed + 1u);
         for (uint i = 0u; i < push.environment_samples; ++i) {
-            sum += environment_direction(f, m, sobol_point(i, seeds));
+            sum += environment_contribution(f, m, sobol_point(i, seeds));
         }
+        for (uint k = 0u; LOCAL_LIGHTS && k < frame.lights.y; ++k) {
+            seeds = sobol_seeds(seed + 2u + k);
+            for (uint i = 0u; i < push.light_samples; ++i) {
+                sum += light_contribution(f, m, at, lights[frame.lights.x + k], sobol_point(i, seeds));
+            }
+        }
+    }
+    if (LOCAL_LIGHTS) {
+        sum += exact_lights(f, m, at);
     }
     imageStore(radiance, p, vec4(sum, 1.0));
 }

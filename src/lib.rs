@@ -3,6 +3,7 @@
 pub mod config;
 pub mod error;
 pub mod gpu;
+pub mod light;
 #[cfg(feature = "offline")]
 pub mod offline;
 pub mod pass;
@@ -20,6 +21,7 @@ pub use gpu::{
     Access, AllocationError, Block, DedicatedAllocator, Host, HostAllocator, ImageRef, Location, MemoryRequest, Missing,
     Requirements, Retired,
 };
+pub use light::Light;
 pub use pass::gbuffer::Draw;
 pub use pass::tonemap::Transfer;
 pub use plan::{Footprint, FootprintRow, memory_footprint};

@@ -2,6 +2,7 @@
 
 use crate::config::{Config, GBufferSource};
 use crate::gpu::image::ImageDesc;
+use crate::light::{LightRecord, MAX_LIGHTS};
 use ash::vk;
 
 /// Sizes that follow from a [`Config`].
@@ -42,6 +43,9 @@ impl Footprint {
 /// Bytes of the arguments of the indirect dispatch: groups in x, y, z and the number of listed samples.
 pub(crate) const ARGUMENT_BYTES: u64 = 16;
 
+/// Bytes of one slot's lights.
+pub(crate) const LIGHT_BYTES: u64 = (MAX_LIGHTS * size_of::<LightRecord>()) as u64;
+
 impl Plan {
     pub fn of(config: &Config) -> Self {
         let shading = config.extent.map(|e| e.saturating_mul(config.samples_per_side));
@@ -75,13 +79,36 @@ impl Plan {
     pub fn list_bytes(&self) -> u64 {
         4 * u64::from(self.shading[0]) * u64::from(self.shading[1])
     }
+}
 
-    /// (brdf, environment) directions of a shaded sample.
-    pub fn directions(config: &Config) -> [u32; 2] {
-        match config.estimator {
-            crate::Estimator::Mis => [config.directions.div_ceil(2), config.directions / 2],
-            _ => [config.directions, 0],
+/// How the directions of a shaded sample are shared out.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Directions {
+    /// From the reflectance.
+    pub brdf: u32,
+    /// From the environment.
+    pub environment: u32,
+    /// From each area light.
+    pub light: u32,
+}
+
+impl Directions {
+    /// Half of the configured number from the reflectance; the other half in equal parts from the environment, if it shines,
+    /// and each of `area_lights`, at least one each.
+    pub fn of(config: &Config, environment: bool, area_lights: u32) -> Self {
+        let n = config.directions;
+        let sources = u32::from(environment) + area_lights;
+        if config.estimator != crate::Estimator::Mis || sources == 0 {
+            return Self { brdf: n, environment: 0, light: 0 };
         }
+        let light = if area_lights > 0 { (n / 2 / sources).max(1) } else { 0 };
+        let rest = (n / 2).saturating_sub(light * area_lights).max(1);
+        Self { brdf: n.div_ceil(2), environment: if environment { rest } else { 0 }, light }
+    }
+
+    /// All directions of a sample.
+    pub fn total(self, area_lights: u32) -> u32 {
+        self.brdf + self.environment + self.light * area_lights
     }
 }
 
@@ -95,6 +122,7 @@ pub fn memory_footprint(config: &Config) -> Footprint {
         name: "frame",
         bytes: config.frames_in_flight as u64 * size_of::<crate::pass::FrameUniform>() as u64,
     });
+    rows.push(FootprintRow { name: "lights", bytes: config.frames_in_flight as u64 * LIGHT_BYTES });
     Footprint { rows }
 }
 
@@ -111,16 +139,25 @@ mod tests {
         let fine = Config { samples_per_side: 4, ..base.clone() };
         assert_eq!(list(&memory_footprint(&fine)), Some(16 * 4 * pixels));
         // surface, derivative, radiance 16 bytes; coordinate 8; ids, depth, list 4; resolved 16
-        assert_eq!(memory_footprint(&base).total(), pixels * (3 * 16 + 8 + 3 * 4 + 16) + 16 + 2 * 128);
+        assert_eq!(memory_footprint(&base).total(), pixels * (3 * 16 + 8 + 3 * 4 + 16) + 16 + 2 * (144 + 256 * 64));
     }
 
     #[test]
-    fn directions_are_split_without_loss() {
+    fn directions_are_shared_out() {
         for n in [2, 3, 64, 65] {
-            let [b, e] = Plan::directions(&Config { directions: n, ..Config::new([1, 1]) });
-            assert_eq!(b + e, n);
-            assert!(b - e <= 1);
+            let config = Config { directions: n, ..Config::new([1, 1]) };
+            let d = Directions::of(&config, true, 0);
+            assert_eq!((d.total(0), d.light), (n, 0));
+            assert!(d.brdf - d.environment <= 1);
+            assert_eq!(Directions::of(&config, false, 0), Directions { brdf: n, environment: 0, light: 0 });
         }
+        let config = Config::new([1, 1]);
+        let d = Directions::of(&config, true, 3);
+        assert_eq!((d.brdf, d.environment, d.light, d.total(3)), (32, 8, 8, 64));
+        let d = Directions::of(&config, true, 100);
+        assert_eq!((d.environment, d.light), (1, 1));
+        let brdf = Config { estimator: crate::Estimator::Brdf, ..config };
+        assert_eq!(Directions::of(&brdf, true, 3), Directions { brdf: 64, environment: 0, light: 0 });
     }
 
     #[test]

@@ -13,11 +13,12 @@ use crate::gpu::recorder::{Recorder, States};
 use crate::gpu::retire::{Build, Retired};
 use crate::gpu::sampler::Samplers;
 use crate::gpu::timer::{FrameTimings, GpuTimer};
+use crate::light::{self, Light};
 use crate::pass::environment::{EnvironmentImages, EnvironmentUpload};
 use crate::pass::gbuffer::{self, Draw, GBuffer};
 use crate::pass::materials::{MaterialBridge, MaterialImages, MaterialsUpload};
 use crate::pass::{FrameUniform, PassContext, classify, curvature, resolve, shade, tonemap};
-use crate::plan::Plan;
+use crate::plan::{Directions, LIGHT_BYTES};
 use crate::reflectance::Model;
 use crate::sampling::LatLong;
 use crate::targets::Targets;
@@ -75,6 +76,8 @@ pub struct FrameInputs<'a> {
     pub gbuffer: GBufferInput<'a>,
     /// Environment.
     pub environment: EnvironmentUse,
+    /// Lights beside it, at most [`MAX_LIGHTS`](crate::light::MAX_LIGHTS).
+    pub lights: &'a [Light],
     /// Seed and frame number of the sample points.
     pub seed: [u32; 2],
     /// The host's image; `None` leaves the result in the renderer's own.
@@ -102,6 +105,7 @@ pub struct Renderer {
     samplers: Samplers,
     bridge: MaterialBridge,
     uniforms: Vec<Buffer>,
+    lights: Vec<Buffer>,
     passes: Passes,
     targets: Targets,
     environment: Option<EnvironmentImages>,
@@ -128,16 +132,15 @@ impl Renderer {
             let timer = GpuTimer::new(build, slots)?;
             let samplers = Samplers::new(build)?;
             let bridge = MaterialBridge::new(build, slots)?;
-            let uniforms = (0..slots)
-                .map(|_| {
-                    let size = size_of::<FrameUniform>() as u64;
-                    Buffer::new(build, "frame", size, vk::BufferUsageFlags::UNIFORM_BUFFER, Location::Upload)
-                })
-                .collect::<Result<Vec<_>>>()?;
+            let mut upload = |name, size, usage| -> Result<Vec<Buffer>> {
+                (0..slots).map(|_| Buffer::new(build, name, size, usage, Location::Upload)).collect()
+            };
+            let uniforms = upload("frame", size_of::<FrameUniform>() as u64, vk::BufferUsageFlags::UNIFORM_BUFFER)?;
+            let lights = upload("lights", LIGHT_BYTES, vk::BufferUsageFlags::STORAGE_BUFFER)?;
             let passes = Passes::new(build, config, bridge.layout)?;
-            Ok((timer, samplers, bridge, uniforms, passes, Targets::new(build, config)?))
+            Ok((timer, samplers, bridge, [uniforms, lights], passes, Targets::new(build, config)?))
         })?;
-        let (timer, samplers, bridge, uniforms, passes, targets) = parts;
+        let (timer, samplers, bridge, [uniforms, lights], passes, targets) = parts;
         Ok(Self {
             cx,
             config: config.clone(),
@@ -148,6 +151,7 @@ impl Renderer {
             samplers,
             bridge,
             uniforms,
+            lights,
             passes,
             targets,
             environment: None,
@@ -223,13 +227,19 @@ impl Renderer {
         let (Some(environment), Some(materials)) = (&self.environment, &self.materials) else {
             return Err(Error::CallOrder { called: "record", before });
         };
+        if let GBufferInput::Draws(draws) = inputs.gbuffer {
+            gbuffer::check_materials(draws, materials.count())?;
+        }
         if let Some(timings) = self.timer.begin_frame(&self.cx, cmd, inputs.slot)? {
             self.timings = Some(timings);
         }
-        let uniform = frame_uniform(&self.config, self.targets.plan.shading, inputs);
-        let frame = &mut self.uniforms[inputs.slot];
-        frame.bytes_mut().copy_from_slice(bytemuck::bytes_of(&uniform));
-        let frame = &self.uniforms[inputs.slot];
+        let (records, [exact, area]) = light::records(inputs.lights);
+        let uniform =
+            FrameUniform { lights: [exact, area, 0, 0], ..frame_uniform(&self.config, self.targets.plan.shading, inputs) };
+        self.uniforms[inputs.slot].bytes_mut().copy_from_slice(bytemuck::bytes_of(&uniform));
+        let records: &[u8] = bytemuck::cast_slice(&records);
+        self.lights[inputs.slot].bytes_mut()[..records.len()].copy_from_slice(records);
+        let (frame, lights) = (&self.uniforms[inputs.slot], &self.lights[inputs.slot]);
         let (samplers, targets, passes) = (&self.samplers, &self.targets, &self.passes);
         let rec = &mut Recorder::new(&self.cx, cmd, inputs.slot, &mut self.states, Some(&mut self.timer));
 
@@ -256,10 +266,23 @@ impl Renderer {
 
         // 8  Their radiance.
         let radiance = &targets.radiance;
-        let directions = Plan::directions(&self.config);
-        passes
-            .shade
-            .record(rec, &shade::Io { frame, bridge, samplers, environment, materials, arguments, list, directions, radiance });
+        let directions = Directions::of(&self.config, inputs.environment.intensity > 0.0, area);
+        passes.shade.record(
+            rec,
+            &shade::Io {
+                frame,
+                bridge,
+                samplers,
+                environment,
+                materials,
+                arguments,
+                list,
+                lights,
+                light_count: exact + area,
+                directions,
+                radiance,
+            },
+        );
 
         // 9  The output.
         let resolved = &targets.resolved;
@@ -315,7 +338,7 @@ impl Renderer {
         }
         self.targets.retire(&mut self.states, &mut bag);
         self.passes.retire(&mut bag);
-        self.uniforms.into_iter().for_each(|b| b.retire(&mut bag));
+        self.uniforms.into_iter().chain(self.lights).for_each(|b| b.retire(&mut bag));
         self.bridge.retire(&mut bag);
         self.samplers.retire(&mut bag);
         self.timer.retire(&mut bag);
@@ -331,6 +354,7 @@ impl Renderer {
         if !(intensity >= 0.0 && intensity.is_finite() && rotation.is_finite()) {
             return Err(Error::invalid("environment", "finite rotation and intensity >= 0", format!("{:?}", inputs.environment)));
         }
+        light::check(inputs.lights)?;
         match inputs.gbuffer {
             GBufferInput::Draws(draws) => gbuffer::check(draws)?,
             GBufferInput::Host { images, .. } => {
@@ -457,5 +481,6 @@ fn frame_uniform(config: &Config, shading: [u32; 2], inputs: &FrameInputs<'_>) -
         sampling: [inputs.seed[0], inputs.seed[1], config.directions, 0],
         // A turn about +Y moves the map towards smaller u.
         environment: [-rotation / 360.0, intensity, 0.0, 0.0],
+        lights: [0; 4],
     }
 }

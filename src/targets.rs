@@ -48,6 +48,7 @@ impl Targets {
     }
 
     /// The renderer's own colour images by name.
+    #[cfg(feature = "offline")]
     pub fn image(&self, name: &str) -> Option<&Image> {
         let gbuffer = self.gbuffer.as_ref().map(GBufferImages::colors);
         let all = gbuffer.into_iter().flatten().chain(&self.curvature).chain([&self.radiance, &self.resolved]);

@@ -106,7 +106,7 @@ fn baseline_errors(module: &Reflection) -> Vec<String> {
 /// What Rust binds for one module.
 struct ModuleInterface {
     /// As the file in `spirv/`, without `.spv`.
-    name: &'static str,
+    name: String,
     /// Compute only; any other stage is not compared.
     local_size: [u32; 3],
     push_constant_bytes: u32,
@@ -126,12 +126,12 @@ type UsedLayouts = BTreeMap<Vec<(u32, u32, i32)>, BTreeSet<(u32, u32)>>;
 fn interface_errors(rows: &[ModuleInterface], modules: &BTreeMap<String, Reflection>) -> Vec<String> {
     let mut errors = Vec::new();
     let mut shared = UsedLayouts::new();
-    for name in modules.keys().filter(|name| rows.iter().all(|row| row.name != name.as_str())) {
+    for name in modules.keys().filter(|name| rows.iter().all(|row| row.name != **name)) {
         errors.push(format!("{name}: a module that Rust does not list"));
     }
     for row in rows {
         let mut wrong = |what: String| errors.push(format!("{}: {what}", row.name));
-        let Some(module) = modules.get(row.name) else {
+        let Some(module) = modules.get(&row.name) else {
             wrong("Rust lists it, but there is no such module".into());
             continue;
         };
@@ -251,6 +251,83 @@ fn committed_modules_ask_for_no_more_than_the_baseline() {
     }
 }
 
+/// What the passes bind: set 0 the G-buffer bridge, set 1 the material bridge, set 2 the pass's own, and the rasteriser's
+/// push constants, which are as large as every device allows.
+fn bound_by_rust() -> Vec<ModuleInterface> {
+    let set = |set: u32, types: &[vk::DescriptorType]| -> Vec<_> {
+        (0..).zip(types).map(|(binding, &kind)| (set, binding, kind)).collect()
+    };
+    let compute = passband::pass::interfaces().into_iter().map(|interface| {
+        let mut bindings = set(2, interface.own);
+        if interface.gbuffer {
+            bindings.extend(set(0, &passband::pass::gbuffer::BRIDGE));
+        }
+        if interface.materials {
+            bindings.extend(set(1, &passband::pass::materials::BRIDGE));
+        }
+        let name = format!("{}.comp", interface.name);
+        ModuleInterface { name, local_size: interface.local_size, push_constant_bytes: interface.push_bytes, bindings }
+    });
+    let raster = ["gbuffer.vert", "gbuffer.frag"].map(|name| ModuleInterface {
+        name: name.into(),
+        local_size: [0; 3],
+        push_constant_bytes: 128,
+        bindings: Vec::new(),
+    });
+    compute.chain(raster).collect()
+}
+
+/// The repository's own modules by name, told by the files in `spirv/`.
+fn own_modules() -> BTreeMap<String, Reflection> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("spirv");
+    let files = std::fs::read_dir(&folder).unwrap().map(|entry| entry.unwrap().path());
+    let spirv = files.filter(|path| path.extension().is_some_and(|e| e == "spv"));
+    let module = |path: PathBuf| {
+        let name = path.file_stem().unwrap().to_str().unwrap().to_owned();
+        let reflection = reflect(&words(&path)).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
+        (name, reflection)
+    };
+    spirv.map(module).collect()
+}
+
+/// What is bound although no shader uses it: the bridge's texture coordinate and its derivative, which no pass reads yet, and
+/// the alias table in the set of `resolve`, whose include declares it.
+const UNUSED: [&str; 3] = [
+    "set 0 binding 2 (COMBINED_IMAGE_SAMPLER): bound by Rust, used by no shader of that layout",
+    "set 0 binding 3 (COMBINED_IMAGE_SAMPLER): bound by Rust, used by no shader of that layout",
+    "set 2 binding 2 (COMBINED_IMAGE_SAMPLER): bound by Rust, used by no shader of that layout",
+];
+
+#[test]
+fn passes_bind_what_their_modules_declare() {
+    assert_eq!(interface_errors(&bound_by_rust(), &own_modules()), UNUSED);
+}
+
+#[test]
+fn a_pass_that_binds_otherwise_is_found() {
+    let modules = own_modules();
+    let shade = |change: fn(&mut ModuleInterface)| {
+        let mut rows = bound_by_rust();
+        change(rows.iter_mut().find(|row| row.name == "shade.comp").unwrap());
+        interface_errors(&rows, &modules).join("; ")
+    };
+    assert_eq!(shade(|_| {}), UNUSED.join("; "));
+    let swapped = shade(|row| {
+        let [map, arguments] = [1, 3].map(|binding| row.bindings.iter().position(|b| (b.0, b.1) == (2, binding)).unwrap());
+        let kind = row.bindings[map].2;
+        row.bindings[map].2 = std::mem::replace(&mut row.bindings[arguments].2, kind);
+    });
+    assert!(swapped.contains("set 2 binding 1: Rust STORAGE_BUFFER") && swapped.contains("set 2 binding 3: Rust"), "{swapped}");
+    assert!(shade(|row| row.push_constant_bytes += 4).contains("shade.comp: push constants: Rust"));
+    assert!(shade(|row| row.bindings.retain(|b| b.0 != 1)).contains("set 1 binding 0: not in Rust"));
+}
+
+#[test]
+fn embedded_modules_are_the_committed_files() {
+    let embedded: BTreeSet<_> = passband::pass::modules::NAMES.iter().map(ToString::to_string).collect();
+    assert_eq!(embedded, own_modules().into_keys().collect(), "src/pass/modules.rs and spirv/");
+}
+
 /// Reflects a shader that is written to a folder of the test's own.
 fn sample(test: &str, text: &str) -> BTreeMap<String, Reflection> {
     let root = Path::new(env!("CARGO_TARGET_TMPDIR")).join("shaders").join(test);
@@ -275,7 +352,7 @@ void main() {
 fn sample_row() -> ModuleInterface {
     use vk::DescriptorType as T;
     let bindings = vec![(0, 0, T::COMBINED_IMAGE_SAMPLER), (0, 1, T::STORAGE_IMAGE), (1, 2, T::STORAGE_BUFFER)];
-    ModuleInterface { name: "sample.comp", local_size: [8, 4, 1], push_constant_bytes: 80, bindings }
+    ModuleInterface { name: "sample.comp".into(), local_size: [8, 4, 1], push_constant_bytes: 80, bindings }
 }
 
 #[test]
@@ -293,8 +370,8 @@ fn an_interface_that_agrees_passes_and_each_disagreement_is_named() {
     assert!(errors(|row| row.bindings[0].2 = vk::DescriptorType::SAMPLED_IMAGE).contains("set 0 binding 0: Rust SAMPLED_IMAGE"));
     assert!(errors(|row| row.bindings.truncate(2)).contains("set 1 binding 2: not in Rust"));
     assert!(errors(|row| row.bindings.push((1, 3, vk::DescriptorType::STORAGE_BUFFER))).contains("used by no shader"));
-    assert!(errors(|row| row.name = "other.comp").contains("sample.comp: a module that Rust does not list"));
-    assert!(errors(|row| row.name = "other.comp").contains("other.comp: Rust lists it"));
+    assert!(errors(|row| row.name = "other.comp".into()).contains("sample.comp: a module that Rust does not list"));
+    assert!(errors(|row| row.name = "other.comp".into()).contains("other.comp: Rust lists it"));
 }
 
 #[test]

@@ -20,6 +20,9 @@ const uint IMPORTANCE_ANGLES = 64u;
 const uint IMPORTANCE_ROWS = 64u;
 const uint IMPORTANCE_COLUMNS = 16u;
 const vec2 DENSITY_SIZE = vec2(16.0, 64.0); // cos(phi_h), warped theta_h
+// Least distance in texels from the edge of a table in the atlas: the outermost bins' centres, and more than the rounding of a
+// coordinate can miss them by in an atlas of 5 x 5 tables; larger ones have a wider border. The neighbour's values may be a million times higher.
+const float TABLE_BORDER = 0.5 + 1.0 / 8192.0;
 
 // By kind:           table               GGX              Blinn-Phong         vMF                turned tables
 //   kind.yz          place in the atlas                                       first lobe, lobes  first table, tables
@@ -74,8 +77,7 @@ Material material_load(uint id, float cos_o) {
 vec3 material_table_value(vec2 table, vec3 wi, vec3 wo, vec3 h) {
     vec2 c = vec2(acos_positive(clamp(dot(wo, h), 0.0, 1.0)) * (2.0 * INV_PI), half_warp(h)) * TABLE_SIZE.yz;
     vec2 size = vec2(textureSize(reflectance_tables, 0).yz);
-    // Rounding of the coordinate must not let the neighbouring table in, whose grazing entries may be a thousand times larger.
-    vec2 border = 0.5 + size * (1.0 / 4194304.0);
+    vec2 border = max(vec2(TABLE_BORDER), 0.5 + size * (1.0 / 4194304.0));
     c = clamp(c, border, TABLE_SIZE.yz - border) + table;
     vec3 at = vec3(difference_turn(wi, h), c / size);
     return textureLod(reflectance_tables, at, 0.0).rgb;
@@ -132,8 +134,8 @@ vec4 material_sample(Material m, uvec2 u) {
     vec2 size = cell.yw - cell.xz;
     vec2 at = cell.xz + size * (vec2(row_fraction >> 8, column_fraction >> 8) * (1.0 / 16777216.0));
     float s = sqrt(at.x * (2.0 - at.x));
-    float phi = (u.y & 0x80000000u) == 0u ? at.y : -at.y;
-    return vec4(s * cos(phi), s * sin(phi), 1.0 - at.x, 1.0 / (float(2u * IMPORTANCE_ROWS * IMPORTANCE_COLUMNS) * size.x * size.y));
+    vec2 phi = cos_sin((u.y & 0x80000000u) == 0u ? at.y : -at.y);
+    return vec4(s * phi, 1.0 - at.x, 1.0 / (float(2u * IMPORTANCE_ROWS * IMPORTANCE_COLUMNS) * size.x * size.y));
 }
 
 // Smooth density of h in 1/sr, for multiple importance weights only: positive, deterministic, close to that of material_sample.

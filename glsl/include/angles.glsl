@@ -1,4 +1,4 @@
-// Inverse trigonometric functions by least-squares polynomials at Chebyshev nodes; absolute error in radians beside each.
+// Trigonometric functions and their inverses by least-squares polynomials at Chebyshev nodes; absolute error in radians beside each.
 // They replace the driver's own, which differ between drivers and cost more on the reference one.
 #ifndef ANGLES_GLSL
 #define ANGLES_GLSL
@@ -47,6 +47,17 @@ float atan_full(float y, float x) {
 float atan_line(float y, float x) {
     float a = atan_quadrant(abs(y), abs(x));
     return (x < 0.0) != (y < 0.0) ? -a : a;
+}
+
+// (cos x, sin x) for x in [-pi, pi], 5e-8
+vec2 cos_sin(float x) {
+    float a = abs(x);
+    bool far = a > HALF_PI;
+    float y = far ? PI - a : a;
+    float q = y * y;
+    float s = y * fma(q, fma(q, fma(q, fma(q, 2.60516628e-06, -0.000198090464), 0.00833305062), -0.16666658), 0.999999996);
+    float c = fma(q, fma(q, fma(q, fma(q, 2.31531742e-05, -0.00138536669), 0.0416635789), -0.499999051), 0.999999953);
+    return vec2(far ? -c : c, x < 0.0 ? -s : s);
 }
 
 #endif

@@ -9,6 +9,7 @@ layout(set = 2, binding = 0, std140) uniform Frame {
     uvec4 extent;            // shading width, height; samples a side of an output pixel; environment visible
     uvec4 sampling;          // seed, frame, samples a shaded pixel
     vec4 environment;        // rotation in turns, intensity
+    uvec4 lights;            // exact lights, then area lights
 } frame;
 
 // World vector from the eye through the centre of shading sample p, of length 1 along the view axis.

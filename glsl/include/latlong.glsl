@@ -9,10 +9,9 @@ vec2 latlong_uv(vec3 w) {
 
 // Unit direction of uv, and sin(theta) in w.
 vec4 latlong_direction(vec2 uv) {
-    float phi = (uv.x - 0.5) * (2.0 * PI);
-    float theta = uv.y * PI;
-    float s = sin(theta);
-    return vec4(s * sin(phi), cos(theta), -s * cos(phi), s);
+    vec2 phi = cos_sin((fract(uv.x) - 0.5) * (2.0 * PI));
+    vec2 theta = cos_sin(uv.y * PI);
+    return vec4(theta.y * phi.y, theta.x, -theta.y * phi.x, theta.y);
 }
 
 #endif

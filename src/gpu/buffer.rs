@@ -37,6 +37,7 @@ impl Buffer {
     }
 
     /// The host's view of an upload or read-back buffer; empty for device memory.
+    #[cfg(feature = "offline")]
     pub(crate) fn bytes(&self) -> &[u8] {
         match self.block.mapped {
             // SAFETY: the mapping covers `size` bytes and lives as long as the block.

@@ -97,6 +97,8 @@ impl Build<'_> {
             Ok(_) => created.handles.clear(),
             Err(_) => {
                 created.handles.reverse();
+                // The host's allocator is promised that nothing is bound to a block any more.
+                created.handles.sort_by_key(|handle| matches!(handle, Handle::Memory(_)));
                 // SAFETY: the constructor failed, so nothing that it made was ever handed to the device.
                 unsafe { created.free(&cx.device, memory) };
             }

@@ -8,6 +8,7 @@ use crate::offline::image_io::LinearImage;
 use crate::offline::session::Session;
 use crate::offline::stats::{Pixels, Quantiles, Samples, Stats, pass_times};
 use crate::offline::world::World;
+use crate::plan::Directions;
 use crate::{Config, Estimator, Requirements};
 use serde_json::json;
 use std::collections::BTreeMap;
@@ -112,7 +113,9 @@ fn statistics(
     timings: &[FrameTimings],
 ) -> Result<Stats> {
     let shaded = u64::from(session.shaded()?);
-    let taken = shaded * u64::from(config.directions);
+    let area_lights = world.lights.iter().filter(|l| l.is_area()).count() as u32;
+    let shines = world.environment.as_ref().is_some_and(|e| e.intensity > 0.0);
+    let taken = shaded * u64::from(Directions::of(config, shines, area_lights).total(area_lights));
     let estimator = match config.estimator {
         Estimator::Mis => "mis",
         Estimator::Brdf => "brdf",

@@ -18,7 +18,7 @@ use crate::pass::probe::Probe;
 use crate::plan::ARGUMENT_BYTES;
 use crate::renderer::{EnvironmentUse, FrameInputs, GBufferInput, Renderer};
 use crate::sampling::LatLong;
-use crate::{Config, Draw, View};
+use crate::{Config, Draw, Light, View};
 use ash::vk;
 use glam::{DMat4, DVec4, Mat4};
 use std::collections::HashMap;
@@ -36,6 +36,34 @@ struct MeshBuffers {
     count: u32,
 }
 
+/// What every frame of the session shows.
+struct Shown {
+    view: View,
+    draws: Vec<Draw>,
+    environment: EnvironmentUse,
+    lights: Vec<Light>,
+}
+
+impl Shown {
+    /// The world without its objects, which are uploaded one by one.
+    fn of(world: &World, extent: [u32; 2]) -> Self {
+        // Without an environment nothing is spent on sampling one.
+        let none = EnvironmentUse { intensity: 0.0, ..EnvironmentUse::default() };
+        let environment = world.environment.as_ref().map_or(none, |e| EnvironmentUse {
+            intensity: e.intensity as f32,
+            rotation: e.rotation as f32,
+            visible: e.visible,
+        });
+        Self { view: view(&world.camera, extent, near(world)), draws: Vec::new(), environment, lights: world.lights.clone() }
+    }
+
+    fn inputs(&self, seed: [u32; 2]) -> FrameInputs<'_> {
+        let Self { view, draws, environment, lights } = self;
+        let gbuffer = GBufferInput::Draws(draws);
+        FrameInputs { slot: 0, view: *view, gbuffer, environment: *environment, lights, seed, output: None }
+    }
+}
+
 /// Milliseconds of set-up work by name.
 pub type SetupTimes = Vec<(&'static str, f64)>;
 
@@ -44,9 +72,7 @@ pub struct Session {
     headless: Headless,
     renderer: Option<Renderer>,
     meshes: Vec<MeshBuffers>,
-    draws: Vec<Draw>,
-    view: View,
-    environment: EnvironmentUse,
+    shown: Shown,
     setup: SetupTimes,
 }
 
@@ -79,19 +105,8 @@ impl Session {
         setup.push((crate::pass::environment::NAME, milliseconds(clock)));
 
         let clock = Instant::now();
-        let mut session = Self {
-            headless,
-            renderer: Some(renderer),
-            meshes: Vec::new(),
-            draws: Vec::new(),
-            view: view(&world.camera, config.extent, near(world)),
-            environment: world.environment.as_ref().map_or(EnvironmentUse::default(), |e| EnvironmentUse {
-                intensity: e.intensity as f32,
-                rotation: e.rotation as f32,
-                visible: e.visible,
-            }),
-            setup,
-        };
+        let mut session =
+            Self { headless, renderer: Some(renderer), meshes: Vec::new(), shown: Shown::of(world, config.extent), setup };
         session.upload_objects(world)?;
         session.setup.push(("meshes", milliseconds(clock)));
         Ok(session)
@@ -110,7 +125,7 @@ impl Session {
                 }
             };
             let mesh = &self.meshes[index];
-            self.draws.push(Draw {
+            self.shown.draws.push(Draw {
                 positions: (mesh.positions.handle, 0),
                 normals: (mesh.normals.handle, 0),
                 coordinates: (mesh.coordinates.handle, 0),
@@ -153,7 +168,7 @@ impl Session {
     /// # Errors
     /// The library's or the device's.
     pub fn frame(&mut self, seed: [u32; 2]) -> Result<()> {
-        let inputs = inputs(self.view, &self.draws, self.environment, seed);
+        let inputs = self.shown.inputs(seed);
         let renderer = self.renderer.as_mut().ok_or_else(closed)?;
         self.headless.submit(|cmd, _| {
             // SAFETY: every submission is waited for, so slot 0 is always free; the buffers live as long as the session.
@@ -163,13 +178,13 @@ impl Session {
     }
 
     /// Runs a compute module of the caller's own over the session's materials and environment: local size 64, set 1 the
-    /// material bridge, set 2 the frame uniform, the environment's map and alias table, `uvec4` input and `vec4` output; a
+    /// material bridge, set 2 the frame uniform, the environment's map and intervals, `uvec4` input and `vec4` output; a
     /// push constant holds the number of entries. Entry i of the result is output i.
     ///
     /// # Errors
     /// [`crate::Error::Shader`] for words that are no SPIR-V; the device's.
     pub fn probe(&mut self, words: &[u32], input: &[[u32; 4]]) -> Result<Vec<[f32; 4]>> {
-        let inputs = inputs(self.view, &self.draws, self.environment, [0, 0]);
+        let inputs = self.shown.inputs([0, 0]);
         let renderer = self.renderer.as_mut().ok_or_else(closed)?;
         let mut modules = Modules::default();
         modules.replace("probe.comp", words.to_vec());
@@ -322,10 +337,6 @@ fn copy_buffer(rec: &mut Recorder<'_>, buffer: &Buffer, target: &Buffer) {
     let region = vk::BufferCopy { size: buffer.size, ..Default::default() };
     // SAFETY: the command buffer is recording; both buffers have the source's size.
     unsafe { rec.cx.device.cmd_copy_buffer(rec.cmd, buffer.handle, target.handle, &[region]) };
-}
-
-fn inputs(view: View, draws: &[Draw], environment: EnvironmentUse, seed: [u32; 2]) -> FrameInputs<'_> {
-    FrameInputs { slot: 0, view, gbuffer: GBufferInput::Draws(draws), environment, seed, output: None }
 }
 
 fn closed() -> Error {

@@ -1,5 +1,6 @@
 //! A scene that has been read and resolved: everything in memory, ready to be uploaded or integrated.
 
+use crate::Light;
 use crate::offline::mesh::Mesh;
 use crate::reflectance::Model;
 use crate::sampling::LatLong;
@@ -94,6 +95,8 @@ pub struct World {
     pub size: Option<[u32; 2]>,
     /// The distant environment, if any.
     pub environment: Option<EnvironmentLight>,
+    /// Lights beside it.
+    pub lights: Vec<Light>,
     /// Objects in scene order.
     pub objects: Vec<Object>,
     /// Materials, indexed by the objects.

@@ -1,4 +1,5 @@
-//! Pass 0a: the distant environment, uploaded on change: radiance and sampling density in one image, alias table in another.
+//! Pass 0a: the distant environment, uploaded on change: radiance and sampling density in one image, what
+//! directions are drawn from in another.
 
 use crate::error::{Error, Result};
 use crate::gpu::access::Access;
@@ -17,14 +18,14 @@ pub const NAME: &str = "environment";
 pub(crate) struct EnvironmentImages {
     /// RGBA32F: radiance; density over uv.
     pub map: Image,
-    /// RG32UI: threshold as float bits; alias.
-    pub alias: Image,
+    /// RG32UI: alias entries of every row's texels, and the rows' own entries.
+    pub entries: Image,
 }
 
 /// Created and filled, not yet recorded.
 pub(crate) struct EnvironmentUpload {
     map: ImageUpload,
-    alias: ImageUpload,
+    entries: ImageUpload,
 }
 
 impl EnvironmentUpload {
@@ -37,21 +38,23 @@ impl EnvironmentUpload {
         let importance = EnvironmentImportance::build(map)?;
         let radiance: Vec<[f32; 4]> =
             map.texels().iter().zip(importance.density_texels()).map(|(&[r, g, b], density)| [r, g, b, density]).collect();
-        let alias: Vec<[u32; 2]> = importance.alias().entries().iter().map(|e| [e.threshold.to_bits(), e.alias]).collect();
-        let desc = |name, format| ImageDesc {
+        let (extent, entries) = importance.entries();
+        let desc = |name, format, [width, height]: [u32; 2]| ImageDesc {
             name,
             format,
-            extent: [map.width(), map.height(), 1],
+            extent: [width, height, 1],
             usage: vk::ImageUsageFlags::SAMPLED,
         };
+        let radiance_desc = desc("environment", vk::Format::R32G32B32A32_SFLOAT, [map.width(), map.height()]);
+        let entries_desc = desc("environment entries", vk::Format::R32G32_UINT, extent);
         Ok(Self {
-            map: ImageUpload::new(build, desc("environment", vk::Format::R32G32B32A32_SFLOAT), bytemuck::cast_slice(&radiance))?,
-            alias: ImageUpload::new(build, desc("environment alias", vk::Format::R32G32_UINT), bytemuck::cast_slice(&alias))?,
+            map: ImageUpload::new(build, radiance_desc, bytemuck::cast_slice(&radiance))?,
+            entries: ImageUpload::new(build, entries_desc, bytemuck::cast_slice(&entries))?,
         })
     }
 
     pub fn record(self, rec: &mut Recorder<'_>, bag: &mut Retired) -> EnvironmentImages {
-        EnvironmentImages { map: self.map.record(rec, bag), alias: self.alias.record(rec, bag) }
+        EnvironmentImages { map: self.map.record(rec, bag), entries: self.entries.record(rec, bag) }
     }
 }
 
@@ -59,11 +62,11 @@ impl EnvironmentImages {
     /// Declares both images sampled by the pass that is open.
     pub fn sampled(&self, rec: &mut Recorder<'_>) {
         rec.image(&self.map, Access::COMPUTE_SAMPLED);
-        rec.image(&self.alias, Access::COMPUTE_SAMPLED);
+        rec.image(&self.entries, Access::COMPUTE_SAMPLED);
     }
 
     pub fn retire(self, states: &mut States, bag: &mut Retired) {
-        for image in [self.map, self.alias] {
+        for image in [self.map, self.entries] {
             states.forget(image.handle);
             image.retire(bag);
         }

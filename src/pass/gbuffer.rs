@@ -193,6 +193,14 @@ impl GBuffer {
     }
 }
 
+/// Refuses draws whose material was not uploaded: the shaders would read past the last one.
+pub(crate) fn check_materials(draws: &[Draw], count: u32) -> Result<()> {
+    match draws.iter().position(|draw| draw.material >= count) {
+        Some(i) => Err(Error::invalid(format!("draws[{i}].material"), format!("below {count}"), draws[i].material)),
+        None => Ok(()),
+    }
+}
+
 /// Refuses draws that cannot be encoded or transformed.
 pub(crate) fn check(draws: &[Draw]) -> Result<()> {
     for (i, draw) in draws.iter().enumerate() {

@@ -57,14 +57,13 @@ pub(crate) struct MaterialsUpload {
     density: ImageUpload,
 }
 
-/// Where table number `i` of `count` stands in the atlas, and the atlas's size, in tables along theta_d and theta_h.
+/// Where table number `i` of `count` stands in the atlas, and the atlas's size, in tables along theta_d and theta_h: as square
+/// as can be, since a coordinate is rounded in proportion to the atlas.
 fn place(i: usize, count: usize, limit: u32) -> Option<([u32; 2], [u32; 2])> {
     let per_side = limit as usize / THETA_DIFF;
-    let rows = count.div_ceil(per_side.max(1)).max(1);
-    (rows <= per_side).then(|| {
-        let columns = count.min(per_side).max(1);
-        ([(i % columns) as u32, (i / columns) as u32], [columns as u32, rows as u32])
-    })
+    let columns = (1..=count.max(1)).find(|side| side * side >= count).unwrap_or(1);
+    let rows = count.div_ceil(columns).max(1);
+    (columns <= per_side).then(|| ([(i % columns) as u32, (i / columns) as u32], [columns as u32, rows as u32]))
 }
 
 /// The tables of all models, each stored once however many materials share it.
@@ -144,6 +143,17 @@ impl MaterialsUpload {
         if models.is_empty() || models.len() > MAX_MATERIALS {
             return Err(Error::invalid("materials", format!("1 to {MAX_MATERIALS}"), models.len()));
         }
+        for (i, model) in models.iter().enumerate() {
+            let valid = match model {
+                Model::Ggx(ggx) => ggx.validate(),
+                Model::BlinnPhong(blinn_phong) => blinn_phong.validate(),
+                Model::Table(_) | Model::Turned(_) | Model::Vmf(_) => Ok(()),
+            };
+            valid.map_err(|e| match e {
+                Error::InvalidInput { field, expected, got } => Error::invalid(format!("materials[{i}].{field}"), expected, got),
+                other => other,
+            })?;
+        }
         let tables = Tables::of(models);
         let limit = build.cx.limits.max_image_dimension3_d;
         let atlas = place(0, tables.all.len(), limit)
@@ -157,14 +167,16 @@ impl MaterialsUpload {
         let count = models.len() as u32;
         let table_extent = [PHI_DIFF as u32, THETA_DIFF as u32 * atlas[0], THETA_HALF as u32 * atlas[1]];
         let cell_extent = [angles * COLUMNS as u32, ROWS as u32 * count, 1];
-        let density_extent = [angles * DENSITY_COLUMNS as u32, DENSITY_ROWS as u32 * count, 1];
+        // A power of two on both sides: coordinates are exact, so that a clamp at a tile's edge keeps its neighbour out.
+        let density_extent = [angles * DENSITY_COLUMNS as u32, DENSITY_ROWS as u32 * count.next_power_of_two(), 1];
         let texels = table_atlas(&packed, atlas);
         let cells = side_by_side(importance.iter().map(ImportanceTable::cells), ROWS, COLUMNS);
-        let density: Vec<f16> =
+        let mut density: Vec<f16> =
             side_by_side(importance.iter().map(ImportanceTable::density_texels), DENSITY_ROWS, DENSITY_COLUMNS)
                 .into_iter()
                 .map(f16::from_f32)
                 .collect();
+        density.resize(density_extent[0] as usize * density_extent[1] as usize, f16::ZERO);
         let cast = bytemuck::cast_slice::<u32, u8>;
         Ok(Self {
             records: BufferUpload::new(build, "materials", vk::BufferUsageFlags::STORAGE_BUFFER, bytemuck::cast_slice(&records))?,
@@ -221,6 +233,11 @@ fn side_by_side<'a, T: Copy + 'a>(materials: impl Iterator<Item = &'a [T]>, rows
 }
 
 impl MaterialImages {
+    /// Materials that draws may name.
+    pub fn count(&self) -> u32 {
+        (self.records.size / size_of::<Record>() as u64) as u32
+    }
+
     /// Declares everything read by the pass that is open.
     pub fn sampled(&self, rec: &mut Recorder<'_>) {
         rec.buffer(&self.records, Access::COMPUTE_READ);

@@ -27,6 +27,7 @@ pub(crate) struct FrameUniform {
     pub extent: [u32; 4],
     pub sampling: [u32; 4],
     pub environment: [f32; 4],
+    pub lights: [u32; 4],
 }
 
 /// What passes are built from.

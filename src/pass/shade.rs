@@ -12,6 +12,7 @@ use crate::gpu::sampler::Samplers;
 use crate::pass::PassContext;
 use crate::pass::environment::EnvironmentImages;
 use crate::pass::materials::MaterialImages;
+use crate::plan::Directions;
 use ash::vk::DescriptorType as D;
 use bytemuck::{Pod, Zeroable};
 
@@ -32,6 +33,7 @@ pub const INTERFACE: Interface = Interface {
         D::STORAGE_BUFFER,
         D::STORAGE_BUFFER,
         D::STORAGE_IMAGE,
+        D::STORAGE_BUFFER,
     ],
 };
 
@@ -40,6 +42,7 @@ pub const INTERFACE: Interface = Interface {
 struct Push {
     brdf_samples: u32,
     environment_samples: u32,
+    light_samples: u32,
 }
 
 pub(crate) struct Io<'a> {
@@ -50,13 +53,16 @@ pub(crate) struct Io<'a> {
     pub materials: &'a MaterialImages,
     pub arguments: &'a Buffer,
     pub list: &'a Buffer,
-    /// (reflectance, environment) directions a sample.
-    pub directions: [u32; 2],
+    /// Exact lights first.
+    pub lights: &'a Buffer,
+    pub light_count: u32,
+    pub directions: Directions,
     /// Out: linear radiance where listed.
     pub radiance: &'a Image,
 }
 
-pub(crate) struct Shade(ComputePipeline);
+/// One pipeline for frames without lights beside the environment, one for frames with.
+pub(crate) struct Shade([ComputePipeline; 2]);
 
 impl Shade {
     pub fn new(p: &mut PassContext<'_, '_>, estimator: Estimator) -> Result<Self> {
@@ -66,7 +72,8 @@ impl Shade {
             Estimator::BrdfRandom => 2,
             Estimator::Lookup => 3,
         };
-        Ok(Self(ComputePipeline::new(p.build, p.modules, &INTERFACE, p.bridge, p.slots, &[constant])?))
+        let mut make = |lights| ComputePipeline::new(p.build, p.modules, &INTERFACE, p.bridge, p.slots, &[constant, lights]);
+        Ok(Self([make(0)?, make(1)?]))
     }
 
     pub fn record(&self, rec: &mut Recorder<'_>, io: &Io<'_>) {
@@ -81,18 +88,21 @@ impl Shade {
         let resources = [
             Resource::Uniform(io.frame),
             Resource::Sampled(&io.environment.map, io.samplers.linear),
-            Resource::Sampled(&io.environment.alias, io.samplers.nearest),
+            Resource::Sampled(&io.environment.entries, io.samplers.nearest),
             Resource::Buffer(io.arguments),
             Resource::Buffer(io.list),
             Resource::Storage(io.radiance.view),
+            Resource::Buffer(io.lights),
         ];
-        let [brdf_samples, environment_samples] = io.directions;
-        self.0.bind(rec, io.bridge, &resources, &Push { brdf_samples, environment_samples });
-        self.0.dispatch_indirect(rec, io.arguments);
+        let Directions { brdf, environment, light } = io.directions;
+        let push = Push { brdf_samples: brdf, environment_samples: environment, light_samples: light };
+        let pipeline = &self.0[usize::from(io.light_count > 0)];
+        pipeline.bind(rec, io.bridge, &resources, &push);
+        pipeline.dispatch_indirect(rec, io.arguments);
         rec.end();
     }
 
     pub fn retire(self, bag: &mut Retired) {
-        self.0.retire(bag);
+        self.0.into_iter().for_each(|p| p.retire(bag));
     }
 }

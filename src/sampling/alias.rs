@@ -1,5 +1,6 @@
 //! Drawing an index in proportion to weights with one table look-up: Walker's alias method, built in linear time after
-//! Vose 1991 ("A linear algorithm for generating random numbers with a given distribution"). Twin of `glsl/include/alias.glsl`.
+//! Vose 1991 ("A linear algorithm for generating random numbers with a given distribution"). Twin of
+//! `glsl/include/environment.glsl`.
 
 use crate::error::{Error, Result};
 
@@ -58,6 +59,16 @@ impl AliasTable {
     /// The slots, one per weight.
     pub fn entries(&self) -> &[AliasEntry] {
         &self.entries
+    }
+
+    /// The exact probability of each index.
+    pub fn probabilities(&self) -> Vec<f64> {
+        let n = self.entries.len() as f64;
+        let mut sums: Vec<f64> = self.entries.iter().map(|e| f64::from(e.threshold)).collect();
+        for entry in &self.entries {
+            sums[entry.alias as usize] += 1.0 - f64::from(entry.threshold);
+        }
+        sums.into_iter().map(|s| s / n).collect()
     }
 
     /// The index that the uniform `u / 2^32` draws, and what is left of it: a fresh uniform in `[0, 1)`.

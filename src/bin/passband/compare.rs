@@ -2,9 +2,10 @@
 
 use comfy_table::{CellAlignment, Table, presets};
 use passband::offline::error::{Error, Result};
-use passband::offline::metrics::{Exposure, FlipMap, Mask, Metrics, Pair, compare, read_frames};
+use passband::offline::image_io::write_png;
+use passband::offline::metrics::{Exposure, Mask, Metrics, Pair, compare, read_frames};
 use std::io::Write;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 /// Compares an image or a sequence with its reference
@@ -90,7 +91,8 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let result = compare(&pairs, args.exposure, a.sequence)?;
     let breaches = breaches(args, &result.metrics)?;
     if let Some(path) = &args.diff {
-        write_png(path, &result.map)?;
+        let opaque: Vec<u8> = result.map.magma().chunks_exact(3).flat_map(|rgb| rgb.iter().copied().chain([255])).collect();
+        write_png(path, result.map.width, result.map.height, &opaque)?;
     }
     let text = if args.json { json(&result.metrics)? } else { table(&result.metrics) };
     let failed = |e: std::io::Error| Error::Write { path: "standard output".into(), reason: e.to_string() };
@@ -145,20 +147,4 @@ fn table(metrics: &Metrics) -> String {
         column.set_cell_alignment(CellAlignment::Right);
     }
     table.trim_fmt()
-}
-
-/// Writes the map under a temporary name in the same folder and renames it.
-fn write_png(path: &Path, map: &FlipMap) -> Result<()> {
-    let failed = |reason: &dyn ToString| Error::Write { path: path.into(), reason: reason.to_string() };
-    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let mut builder = tempfile::Builder::new();
-    // The usual mode of a new file: the system's mask applies.
-    #[cfg(unix)]
-    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-    let mut file = builder.tempfile_in(folder).map_err(|e| failed(&e))?;
-    let png = image::codecs::png::PngEncoder::new(file.as_file_mut());
-    let encoded = image::ImageEncoder::write_image(png, &map.magma(), map.width, map.height, image::ExtendedColorType::Rgb8);
-    encoded.map_err(|e| failed(&e))?;
-    file.persist(path).map_err(|e| failed(&e.error))?;
-    Ok(())
 }

@@ -1,9 +1,10 @@
 //! Images and numbered sequences from files.
 
 use crate::offline::error::{At, Error, Result};
+use crate::offline::image_io::{LinearImage, Png, PngSamples, read_image, read_png};
+use crate::offline::input;
 use crate::offline::metrics::Picture;
 use crate::offline::metrics::display::decode;
-use exr::prelude::{ReadChannels, ReadLayers};
 use std::path::{Path, PathBuf};
 
 /// One image, or the frames of a sequence in the order of their numbers.
@@ -45,8 +46,8 @@ pub fn read_frames(path: &Path, mask: Mask) -> Result<Frames> {
     for (number, file) in files {
         let image = load(&file)?;
         frames.numbers.push(number);
-        frames.masks.push(image.mask(&file, mask)?);
-        frames.pictures.push(image.picture(&file)?);
+        frames.masks.push(mask_of(&file, &image, mask)?);
+        frames.pictures.push(picture(&file, &image)?);
     }
     Ok(frames)
 }
@@ -91,114 +92,93 @@ impl Pattern {
     }
 }
 
-/// Planar channels; those of other layers than the image itself are called `layer.channel`.
-struct Planes {
-    width: u32,
-    height: u32,
-    channels: Vec<(String, Vec<f32>)>,
-}
-
-impl Planes {
-    fn channel(&self, path: &Path, name: &str) -> Result<&[f32]> {
-        let found = self.channels.iter().find(|(n, _)| n == name).map(|(_, samples)| samples.as_slice());
-        found.ok_or_else(|| Error::file(path, At::File, format!("channel {name}"), "one of that name", self.names()))
-    }
-
-    fn names(&self) -> String {
-        self.channels.iter().map(|(name, _)| name.as_str()).collect::<Vec<_>>().join(", ")
-    }
-
-    fn picture(&self, path: &Path) -> Result<Picture> {
-        let [r, g, b] = [self.channel(path, "R")?, self.channel(path, "G")?, self.channel(path, "B")?];
-        let rgb: Vec<[f32; 3]> = r.iter().zip(g).zip(b).map(|((r, g), b)| [*r, *g, *b]).collect();
-        self.check(path, "radiance", |i| rgb.get(i).is_some_and(|p| p.iter().all(|v| v.is_finite())))?;
-        Ok(Picture { width: self.width, height: self.height, rgb })
-    }
-
-    fn mask(&self, path: &Path, mask: Mask) -> Result<Vec<bool>> {
-        let of_layer = |name: &str, layer: &str| {
-            name == layer || name.strip_prefix(layer).is_some_and(|rest| rest.starts_with('.') && !rest[1..].contains('.'))
-        };
-        let count = self.width as usize * self.height as usize;
-        let layer = match mask {
-            Mask::All => return Ok(vec![true; count]),
-            Mask::Alpha if !self.channels.iter().any(|(name, _)| name == "A") => return Ok(vec![true; count]),
-            Mask::Alpha => "A",
-            Mask::Layer(layer) => layer,
-        };
-        let planes: Vec<&Vec<f32>> = self.channels.iter().filter(|(name, _)| of_layer(name, layer)).map(|(_, s)| s).collect();
-        if planes.is_empty() {
-            return Err(Error::file(path, At::File, format!("layer {layer}"), "one of that name", self.names()));
-        }
-        let any = |i: usize, test: fn(&f32) -> bool| planes.iter().any(|samples| samples.get(i).is_some_and(test));
-        self.check(path, layer, |i| !any(i, |v| v.is_nan()))?;
-        Ok((0..count).map(|i| any(i, |v| *v > 0.0)).collect())
-    }
-
-    /// Counts the pixels that are not `good` and names the first.
-    fn check(&self, path: &Path, what: &str, good: impl Fn(usize) -> bool) -> Result<()> {
-        let width = self.width as usize;
-        let mut bad = (0..width * self.height as usize).filter(|i| !good(*i));
-        match bad.next() {
-            None => Ok(()),
-            Some(first) => {
-                let got =
-                    format!("NaN or infinity in {} pixels, first at ({}, {})", 1 + bad.count(), first % width, first / width);
-                Err(Error::file(path, At::File, what, "finite values", got))
-            }
-        }
+/// Reads any of the formats; a PNG is decoded from sRGB.
+fn load(path: &Path) -> Result<LinearImage> {
+    match input::extension(path).as_str() {
+        "exr" | "hdr" => read_image(path),
+        "png" => Ok(linear(&read_png(path)?)),
+        other => Err(Error::file(path, At::File, "format", ".exr, .hdr or .png", format!(".{other}"))),
     }
 }
 
-/// The one place that reads image files.
-fn load(path: &Path) -> Result<Planes> {
-    let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
-    match extension.as_str() {
-        "exr" => load_exr(path),
-        "png" | "hdr" => load_image(path, extension == "png"),
-        _ => Err(Error::file(path, At::File, "format", ".exr, .hdr or .png", format!(".{extension}"))),
+/// The PNG's linear `R G B`, and `A` if it has it.
+fn linear(png: &Png) -> LinearImage {
+    let samples: Vec<f64> = match &png.samples {
+        PngSamples::Bits8(samples) => samples.iter().map(|v| f64::from(*v) / 255.0).collect(),
+        PngSamples::Bits16(samples) => samples.iter().map(|v| f64::from(*v) / 65535.0).collect(),
+    };
+    let count = usize::from(png.channels);
+    let (colours, alpha) = (if count < 3 { 1 } else { 3 }, count.is_multiple_of(2));
+    let plane = |c: usize| samples.iter().skip(c).step_by(count.max(1)).copied();
+    let colour = |c: usize| plane(c % colours).map(|v| decode(v) as f32).collect();
+    let mut channels: Vec<_> = ["R", "G", "B"].iter().enumerate().map(|(c, name)| (name.to_string(), colour(c))).collect();
+    channels.extend(alpha.then(|| ("A".to_string(), plane(colours).map(|v| v as f32).collect())));
+    LinearImage { width: png.width, height: png.height, channels }
+}
+
+fn names(image: &LinearImage) -> String {
+    image.channels.iter().map(|(name, _)| name.as_str()).collect::<Vec<_>>().join(", ")
+}
+
+fn picture(path: &Path, image: &LinearImage) -> Result<Picture> {
+    let missing = || Error::file(path, At::File, "channels", "R, G and B", names(image));
+    let rgb = image.rgb().ok_or_else(missing)?;
+    check(path, image, "radiance", |i| rgb.get(i).is_some_and(|p| p.iter().all(|v| v.is_finite())))?;
+    Ok(Picture { width: image.width, height: image.height, rgb })
+}
+
+fn mask_of(path: &Path, image: &LinearImage, mask: Mask) -> Result<Vec<bool>> {
+    let of_layer = |name: &str, layer: &str| {
+        name == layer || name.strip_prefix(layer).is_some_and(|rest| rest.starts_with('.') && !rest[1..].contains('.'))
+    };
+    let count = image.width as usize * image.height as usize;
+    let layer = match mask {
+        Mask::All => return Ok(vec![true; count]),
+        Mask::Alpha if image.channel("A").is_none() => return Ok(vec![true; count]),
+        Mask::Alpha => "A",
+        Mask::Layer(layer) => layer,
+    };
+    let planes: Vec<&Vec<f32>> = image.channels.iter().filter(|(name, _)| of_layer(name, layer)).map(|(_, s)| s).collect();
+    if planes.is_empty() {
+        return Err(Error::file(path, At::File, format!("layer {layer}"), "one of that name", names(image)));
+    }
+    let any = |i: usize, test: fn(&f32) -> bool| planes.iter().any(|samples| samples.get(i).is_some_and(test));
+    check(path, image, layer, |i| !any(i, |v| v.is_nan()))?;
+    Ok((0..count).map(|i| any(i, |v| *v > 0.0)).collect())
+}
+
+/// Counts the pixels that are not `good` and names the first.
+fn check(path: &Path, image: &LinearImage, what: &str, good: impl Fn(usize) -> bool) -> Result<()> {
+    let width = image.width as usize;
+    let mut bad = (0..width * image.height as usize).filter(|i| !good(*i));
+    match bad.next() {
+        None => Ok(()),
+        Some(first) => {
+            let got = format!("NaN or infinity in {} pixels, first at ({}, {})", 1 + bad.count(), first % width, first / width);
+            Err(Error::file(path, At::File, what, "finite values", got))
+        }
     }
 }
 
-fn load_exr(path: &Path) -> Result<Planes> {
-    let malformed = |got: String| Error::file(path, At::File, "EXR", "a readable OpenEXR image", got);
-    let file = exr::prelude::read().no_deep_data().largest_resolution_level().all_channels().all_layers().all_attributes();
-    let file = file.from_file(path).map_err(|e| malformed(e.to_string()))?;
-    let size = file.layer_data.first().map(|layer| layer.size).ok_or_else(|| malformed("no part".into()))?;
-    let mut channels = Vec::new();
-    for layer in &file.layer_data {
-        if layer.size != size {
-            return Err(malformed("parts of different sizes".into()));
-        }
-        for channel in &layer.channel_data.list {
-            // The parts of a layered file are named; a lone part is the image itself.
-            let layer_name = layer.attributes.layer_name.as_ref().filter(|_| file.layer_data.len() > 1);
-            let name = layer_name.map_or(channel.name.to_string(), |layer| format!("{layer}.{}", channel.name));
-            let samples: Vec<f32> = channel.sample_data.values_as_f32().collect();
-            if samples.len() != size.area() {
-                return Err(malformed(format!("sub-sampled channel {name}")));
-            }
-            channels.push((name, samples));
-        }
-    }
-    let [width, height] = [size.width(), size.height()].map(|n| u32::try_from(n).map_err(|e| malformed(e.to_string())));
-    Ok(Planes { width: width?, height: height?, channels })
-}
+#[cfg(test)]
+mod tests {
+    use super::*;
 
-fn load_image(path: &Path, encoded: bool) -> Result<Planes> {
-    let malformed =
-        |e: &dyn ToString| Error::file(path, At::File, "image", "a readable PNG or Radiance HDR image", e.to_string());
-    let reader = image::ImageReader::open(path).map_err(|e| malformed(&e))?.with_guessed_format().map_err(|e| malformed(&e))?;
-    let file = reader.decode().map_err(|e| malformed(&e))?;
-    let has_alpha = file.color().has_alpha();
-    let (width, height) = (file.width(), file.height());
-    let pixels = file.into_rgba32f();
-    let colour = |v: f32| if encoded { decode(v.into()) as f32 } else { v };
-    let plane = |c: usize| pixels.pixels().filter_map(move |p| p.0.get(c).copied());
-    let mut channels: Vec<(String, Vec<f32>)> =
-        [("R", 0), ("G", 1), ("B", 2)].map(|(name, c)| (name.into(), plane(c).map(colour).collect())).into();
-    if has_alpha {
-        channels.push(("A".into(), plane(3).collect()));
+    #[test]
+    fn png_samples_of_every_layout_become_linear() {
+        let half = decode(0.5) as f32;
+        let png = |channels, samples| linear(&Png { width: 1, height: 2, channels, samples });
+        let grey = png(1, PngSamples::Bits8(vec![0, 255]));
+        assert_eq!(grey.rgb(), Some(vec![[0.0; 3], [1.0; 3]]));
+        assert_eq!(grey.channel("A"), None);
+        let with_alpha = png(2, PngSamples::Bits16(vec![65535, 0, 0, 13107]));
+        assert_eq!(with_alpha.rgb(), Some(vec![[1.0; 3], [0.0; 3]]));
+        assert_eq!(with_alpha.channel("A"), Some([0.0, 0.2].as_slice()));
+        let colour = png(3, PngSamples::Bits16(vec![65535, 0, 0, 0, 65535, 0]));
+        assert_eq!(colour.rgb(), Some(vec![[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]));
+        let all = png(4, PngSamples::Bits8(vec![0, 0, 255, 51, 255, 0, 128, 255]));
+        let rgb = all.rgb().unwrap();
+        assert_eq!(rgb[0], [0.0, 0.0, 1.0]);
+        assert!((rgb[1][2] - half).abs() < 2e-3 && all.channel("A") == Some([0.2, 1.0].as_slice()));
     }
-    Ok(Planes { width, height, channels })
 }

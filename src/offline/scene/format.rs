@@ -9,7 +9,7 @@ use serde::Deserialize;
 use std::collections::BTreeMap;
 use toml::Spanned;
 
-type Key<T> = Option<Spanned<T>>;
+pub(super) type Key<T> = Option<Spanned<T>>;
 pub(super) type Vector = [f64; 3];
 
 #[derive(Debug, Deserialize)]

@@ -2,57 +2,12 @@
 
 use crate::offline::error::Result;
 use crate::offline::scene::check::{Check, span};
-use crate::offline::scene::format::{Animation, Light, Material, Settings, Triple, Vector};
+use crate::offline::scene::format::{Animation, Material, Settings, Vector};
 use crate::offline::scene::source::Span;
 use glam::DVec3;
 use toml::Spanned;
 
 impl Check<'_> {
-    pub(super) fn light(&mut self, light: &Spanned<Light>) -> Result<()> {
-        let l = light.get_ref();
-        let given = [
-            ("position", span(&l.position)),
-            ("direction", span(&l.direction)),
-            ("u", span(&l.u)),
-            ("v", span(&l.v)),
-            ("radius", span(&l.radius)),
-            ("intensity", span(&l.intensity)),
-            ("irradiance", span(&l.irradiance)),
-            ("radiance", span(&l.radiance)),
-        ];
-        self.name(&l.r#type, &["point", "directional", "sphere", "rectangle"])?;
-        let wanted: &[&str] = match l.r#type.get_ref().as_str() {
-            "point" => &["position", "intensity"],
-            "directional" => &["direction", "irradiance"],
-            "sphere" => &["position", "radius", "radiance"],
-            _ => &["position", "u", "v", "radiance"],
-        };
-        let expected = format!("{} of a {} light", wanted.join(", "), l.r#type.get_ref());
-        for (name, at) in given {
-            match at {
-                None if wanted.contains(&name) => {
-                    return Err(self.source.error(&light.span(), expected, format!("no {name}")));
-                }
-                Some(at) if !wanted.contains(&name) => return Err(self.source.error(&at, expected, name)),
-                _ => {}
-            }
-        }
-        self.each(&l.position, Self::vector)?;
-        for vector in [&l.direction, &l.u, &l.v] {
-            self.each(vector, Self::direction)?;
-        }
-        self.each(&l.radius, |c, v| c.number(v, "a number above 0", |v| v > 0.0))?;
-        for colour in [&l.intensity, &l.irradiance, &l.radiance] {
-            self.each(colour, |c, v| {
-                let Triple(rgb) = v.get_ref();
-                let fits = rgb.iter().all(|c| c.is_finite() && *c >= 0.0);
-                c.require(fits, &v.span(), "finite channels >= 0", format!("{rgb:?}"))
-            })?;
-        }
-        self.later.push(light.span());
-        Ok(())
-    }
-
     pub(super) fn maps(&mut self, m: &Material) -> Result<()> {
         for map in [&m.albedo_map, &m.specular_map, &m.normal_map, &m.height_map, &m.roughness_map] {
             self.each(map, |c, v| c.extension(v, &["png", "jpg", "jpeg", "exr", "hdr"]).map(drop))?;

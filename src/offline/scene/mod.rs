@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 mod check;
 mod format;
 mod later;
+mod lights;
 mod materials;
 mod overrides;
 mod resolve;

@@ -3,7 +3,7 @@
 use crate::offline::error::Result;
 use crate::offline::mesh::{self, Mesh};
 use crate::offline::scene::format::{Object as ObjectKeys, Triple};
-use crate::offline::scene::{Scene, materials};
+use crate::offline::scene::{Scene, lights, materials};
 use crate::offline::world::{Camera, EnvironmentLight, Material, Object, World};
 use crate::offline::{builtin, environment};
 use glam::{DMat4, DQuat, DVec3, EulerRot};
@@ -39,6 +39,7 @@ pub(super) fn world(scene: &Scene) -> Result<World> {
         camera,
         size: file.camera.size.as_ref().map(|size| *size.get_ref()),
         environment: environment_light(scene)?,
+        lights: lights::lights(file),
         objects,
         materials: all,
     })

@@ -1,0 +1,2 @@
+// This host uses passband's own materials.
+#include "../../../glsl/bridge/materials.glsl"

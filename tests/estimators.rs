@@ -1,0 +1,283 @@
+//! Estimators agree with closed forms, with the reference and with each other, and frames are what their settings say.
+#![cfg(feature = "offline")]
+
+mod support {
+    pub mod frames;
+    pub mod statistics;
+}
+
+use glam::{DQuat, DVec2, DVec3, Mat4};
+use passband::offline::builtin;
+use passband::offline::reference::Reference;
+use passband::offline::scene::Scene;
+use passband::offline::world::World;
+use passband::reflectance::{Model, Reflectance};
+use passband::sampling::LatLong;
+use passband::{Config, Estimator};
+use rayon::prelude::*;
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
+use support::frames::{Expected, Image, Stage, config, expected, furthest, ggx, ratio, table, tiles, world};
+use support::statistics::Mean;
+
+const EXTENT: [u32; 2] = [32, 32];
+
+fn sky(name: &str) -> LatLong {
+    builtin::environment(name, 128).unwrap()
+}
+
+/// The directional albedo towards cosine `c`, by midpoints over half vectors in `theta_h = atan(alpha tan(x))`, which spreads a
+/// lobe of any alpha evenly.
+fn albedo(model: &Model, alpha: f64, c: f64) -> DVec3 {
+    const STEPS: u32 = 256;
+    let wo = DVec3::new((1.0 - c * c).sqrt(), 0.0, c);
+    let middle = |i: u32| (f64::from(i) + 0.5) / f64::from(STEPS);
+    let mut sum = DVec3::ZERO;
+    for i in 0..STEPS {
+        let x = middle(i) * FRAC_PI_2;
+        let theta = (alpha * x.tan()).atan();
+        let step = alpha / (x.cos().powi(2) + (alpha * x.sin()).powi(2)) * FRAC_PI_2 / f64::from(STEPS);
+        for j in 0..STEPS {
+            let phi = middle(j) * PI;
+            let h = DVec3::new(theta.sin() * phi.cos(), theta.sin() * phi.sin(), theta.cos());
+            let wi = h * (2.0 * wo.dot(h)) - wo;
+            if wi.z > 0.0 && wo.dot(h) > 0.0 {
+                // Both signs of the azimuth; d(wi) = 4 (wo.h) d(h).
+                sum += model.evaluate(wi, wo) * (wi.z * 4.0 * wo.dot(h) * theta.sin() * step * TAU / f64::from(STEPS));
+            }
+        }
+    }
+    sum
+}
+
+/// Rendered over expected, image or 16x16 tile, whichever is furthest off, for a lone object under constant light of `factor`.
+fn furnace(world: &World, alpha: f64, factor: f64) -> f64 {
+    let reference = Reference::new(world, EXTENT, Default::default()).unwrap();
+    let mut stage = Stage::new(world, &config(EXTENT, Estimator::Mis, 16384));
+    let image = stage.frame([3, 0]);
+    let model = &world.materials[0].model;
+    // The albedo is smooth in the cosine: tabulated once, interpolated linearly.
+    const NODES: usize = 64;
+    let node = |i: usize| albedo(model, alpha, (i as f64 / NODES as f64).max(0.01));
+    let nodes: Vec<DVec3> = (0..=NODES).into_par_iter().map(node).collect();
+    let mut pixels = Vec::new();
+    for (i, hit) in reference.hits().iter().enumerate() {
+        let Some(hit) = hit else { continue };
+        let x = hit.normal.dot(hit.view).min(1.0) * NODES as f64;
+        let k = (x as usize).min(NODES - 1);
+        if x > 2.0 {
+            pixels.push((i, nodes[k].lerp(nodes[k + 1], x - k as f64) * factor));
+        }
+    }
+    let expected = Expected { extent: EXTENT, pixels, error: 0.0 };
+    let radiance = |i: usize| image.radiance(i);
+    furthest(tiles(&expected, 64, radiance).into_iter().chain([ratio(&expected.pixels, radiance)]))
+}
+
+#[test]
+fn under_constant_light_an_object_shows_its_albedo() {
+    let scene = Scene::load("furnace", &[]).unwrap().resolve().unwrap();
+    let worst = furnace(&scene, 0.2, 1.0);
+    println!("scene furnace: {worst:.6}");
+    assert!((worst - 1.0).abs() < 1e-3, "{worst}");
+    for (alpha, rotation, intensity) in [(0.05, 0.0, 1.0), (0.3, 37.0, 1.0), (0.6, -200.0, 2.5), (1.0, 0.0, 0.01)] {
+        let model = ggx(alpha, DVec3::new(1.0, 0.5, 0.04), DVec3::new(0.0, 0.3, 0.8));
+        let mut world = world("sphere", 64, model, sky("constant"));
+        let light = world.environment.as_mut().unwrap();
+        (light.rotation, light.intensity) = (rotation, intensity);
+        let worst = furnace(&world, alpha, intensity);
+        println!("alpha {alpha}, turned by {rotation}, times {intensity}: {worst:.6}");
+        assert!((worst - 1.0).abs() < 1e-3, "alpha {alpha}: {worst}");
+    }
+}
+
+/// That the mean over `frames` seeds of the interior pixels' sum is the reference's, in each channel: within 4 standard errors,
+/// which must be below `precision` of it, and 0.05 % for the packing of tables and for the quadrature.
+fn assert_unbiased(label: &str, world: &World, config: &Config, frames: u32, precision: f64) {
+    let expected = expected(world, EXTENT, |interior| interior);
+    let truth: DVec3 = expected.pixels.iter().map(|(_, radiance)| *radiance).sum();
+    let mut stage = Stage::new(world, config);
+    let mut means: [Mean; 3] = Default::default();
+    for frame in 0..frames {
+        let image = stage.frame([11, frame]);
+        let sum: DVec3 = expected.pixels.iter().map(|(i, _)| image.radiance(*i)).sum();
+        means.iter_mut().zip((sum / truth).to_array()).for_each(|(mean, ratio)| mean.add(ratio));
+    }
+    let ratios = [0, 1, 2].map(|c| means[c].mean());
+    let errors = [0, 1, 2].map(|c| means[c].error());
+    println!("{label}: {ratios:.5?}, standard errors {errors:.5?}");
+    for (ratio, error) in ratios.into_iter().zip(errors) {
+        assert!(error < precision, "{label}: a standard error of {error}");
+        assert!((ratio - 1.0).abs() <= 4.0 * error + 5e-4, "{label}: {ratio} +- {error}");
+    }
+}
+
+#[test]
+fn every_estimator_has_the_reference_as_its_mean() {
+    let coated = ggx(0.3, DVec3::new(0.6, 0.3, 0.05), DVec3::new(0.1, 0.3, 0.6));
+    for (mesh, model) in [("bumpy-sphere", table("metallic-paint")), ("torus-knot", coated)] {
+        let world = world(mesh, 48, model, sky("studio"));
+        for estimator in [Estimator::Mis, Estimator::Brdf, Estimator::BrdfRandom] {
+            assert_unbiased(&format!("{mesh}, {estimator:?}"), &world, &config(EXTENT, estimator, 128), 256, 2e-3);
+        }
+    }
+}
+
+#[test]
+fn few_directions_are_as_unbiased_as_many() {
+    let world = world("sphere", 64, table("metallic-paint"), sky("studio"));
+    for (directions, frames) in [(2, 2048), (3, 2048), (64, 128)] {
+        let config = config(EXTENT, Estimator::Mis, directions);
+        assert_unbiased(&format!("{directions} directions"), &world, &config, frames, 2e-3);
+    }
+}
+
+/// Points that are well spread must stay so on their way to directions: a mirror-like lobe under a small sun tells.
+#[test]
+fn a_small_sun_in_a_mirror_is_not_noisy() {
+    let world = world("sphere", 64, table("mirror-metal"), sky("sun-sky"));
+    let expected = expected(&world, EXTENT, |interior| interior);
+    let mut stage = Stage::new(&world, &config(EXTENT, Estimator::Mis, 1024));
+    let mut mean = Mean::default();
+    for frame in 0..32 {
+        let image = stage.frame([5, frame]);
+        mean.add(ratio(&expected.pixels, |i| image.radiance(i)));
+    }
+    println!("one frame deviates by {:.5}", mean.deviation());
+    assert!(mean.deviation() < 2.5e-3, "{}", mean.deviation());
+}
+
+#[test]
+fn frames_depend_on_their_seeds_and_on_nothing_else() {
+    let world = world("bumpy-sphere", 48, table("metallic-paint"), sky("sun-sky"));
+    for estimator in [Estimator::Mis, Estimator::Brdf, Estimator::BrdfRandom] {
+        let config = config(EXTENT, estimator, 16);
+        let (mut one, mut other) = (Stage::new(&world, &config), Stage::new(&world, &config));
+        let first = one.frame([1, 0]);
+        let frames = [[1, 0], [2, 0], [1, 1], [1, 0]].map(|seed| other.frame(seed));
+        assert!(first == frames[0] && first == frames[3], "{estimator:?}: two runs differ");
+        for k in [1, 2] {
+            let covered = (0..first.texels.len()).filter(|i| first.coverage(*i) > 0.0);
+            let (mut same, mut count) = (0, 0);
+            for i in covered {
+                same += usize::from(first.texels[i] == frames[k].texels[i]);
+                count += 1;
+            }
+            assert!(same * 100 < count, "{estimator:?}: {same} of {count} pixels are the same under another seed");
+        }
+    }
+}
+
+/// Everything but the environment turned about +Y.
+fn turned(world: &World, degrees: f64) -> World {
+    let turn = DQuat::from_rotation_y(degrees.to_radians());
+    let mut world = world.clone();
+    world.camera.position = turn * world.camera.position;
+    for object in &mut world.objects {
+        object.transform = Mat4::from_quat(turn.as_quat()) * object.transform;
+    }
+    world
+}
+
+/// `|a - b| / |b|` over all pixels.
+fn distance(a: &Image, b: &Image) -> f64 {
+    let square = |f: &dyn Fn(usize) -> DVec3| (0..b.texels.len()).map(|i| f(i).length_squared()).sum::<f64>();
+    (square(&|i| a.radiance(i) - b.radiance(i)) / square(&|i| b.radiance(i))).sqrt()
+}
+
+#[test]
+fn a_turned_environment_is_a_turned_world() {
+    let mut plain = world("torus-knot", 48, table("metallic-paint"), sky("sun-sky"));
+    plain.environment.as_mut().unwrap().visible = true;
+    let image = |world: &World| Stage::new(world, &config(EXTENT, Estimator::Mis, 256)).frame([0, 0]);
+    let expected = image(&plain);
+    for degrees in [90.0, -30.0] {
+        let mut world = turned(&plain, degrees);
+        let wrong = distance(&image(&world), &expected);
+        world.environment.as_mut().unwrap().rotation = degrees;
+        let right = distance(&image(&world), &expected);
+        println!("turned by {degrees}: {right:.2e}, without the environment {wrong:.2e}");
+        assert!(right < 1e-3 && wrong > 0.1, "{degrees}: {right} {wrong}");
+    }
+}
+
+#[test]
+fn radiance_grows_with_intensity() {
+    let mut world = world("bumpy-sphere", 48, table("rough"), sky("sun-sky"));
+    world.environment.as_mut().unwrap().visible = true;
+    let mut image = |intensity: f64| {
+        world.environment.as_mut().unwrap().intensity = intensity;
+        Stage::new(&world, &config(EXTENT, Estimator::Mis, 64)).frame([0, 0])
+    };
+    let plain = image(1.0);
+    let scaled =
+        |image: &Image, by: f32| Image { texels: image.texels.iter().map(|[r, g, b, a]| [r * by, g * by, b * by, *a]).collect() };
+    // A power of two only changes exponents.
+    assert!(image(4.0) == scaled(&plain, 4.0));
+    assert!(distance(&image(3.0), &scaled(&plain, 3.0)) < 1e-6);
+    assert!(image(0.0) == scaled(&plain, 0.0));
+}
+
+/// Seeds follow shading samples, so the samples of `--aa` are the pixels of a larger image, bit for bit.
+#[test]
+fn antialiasing_is_the_average_of_a_larger_image() {
+    let mut world = world("torus-knot", 48, table("metallic-paint"), sky("sun-sky"));
+    world.environment.as_mut().unwrap().visible = true;
+    for side in [2, 4] {
+        let small = Config { samples_per_side: side, ..config([16, 12], Estimator::Mis, 16) };
+        let large = config([16 * side, 12 * side], Estimator::Mis, 16);
+        let (small, large) = (Stage::new(&world, &small).frame([9, 0]), Stage::new(&world, &large).frame([9, 0]));
+        let side = side as usize;
+        for (i, texel) in small.texels.iter().enumerate() {
+            let (x, y) = (i % 16 * side, i / 16 * side);
+            let mut sum = [0.0; 4];
+            for k in 0..side * side {
+                let sample = large.texels[(y + k / side) * 16 * side + x + k % side];
+                sum.iter_mut().zip(sample).for_each(|(sum, v)| *sum += v);
+            }
+            assert_eq!(*texel, sum.map(|v| v / (side * side) as f32), "pixel {i} of {} samples", side * side);
+        }
+        assert!(small.texels.iter().any(|t| t[3] > 0.0 && t[3] < 1.0) && small.texels.iter().any(|t| t[3] == 1.0));
+    }
+}
+
+#[test]
+fn the_background_is_the_environment_or_nothing() {
+    let mut world = world("sphere", 32, table("rough"), sky("sun-sky"));
+    // From the object at the lower edge over the sun to the zenith.
+    world.camera.target = world.camera.position + DVec3::new(0.0, 0.5, -0.6);
+    world.camera.fov_y = 110.0;
+    let image = |world: &World| Stage::new(world, &config(EXTENT, Estimator::Mis, 2)).frame([0, 0]);
+    let dark = image(&world);
+    let covered = dark.texels.iter().filter(|t| t[3] == 1.0).count();
+    assert!(covered > 10 && covered < 900, "{covered} pixels are covered");
+    assert!(dark.texels.iter().all(|t| t[3] == 1.0 || *t == [0.0; 4]));
+
+    let light = world.environment.as_mut().unwrap();
+    (light.visible, light.rotation, light.intensity) = (true, 150.0, 1.5);
+    let bright = image(&world);
+    let light = world.environment.as_ref().unwrap();
+    let mut brightest: f64 = 0.0;
+    for (i, texel) in bright.texels.iter().enumerate().filter(|(_, t)| t[3] == 0.0) {
+        let w = world.camera.ray(DVec2::new((i % 32) as f64 + 0.5, (i / 32) as f64 + 0.5), EXTENT);
+        let expected = light.radiance(w);
+        // What a direction a hair off would show.
+        let (s, t) = w.any_orthonormal_pair();
+        let hair = |d: DVec3| (light.radiance((w + d * 2e-5).normalize()) - expected).abs();
+        let bound = [s, -s, t, -t].map(hair).into_iter().fold(expected * 1e-5, DVec3::max);
+        let off = (bright.radiance(i) - expected).abs();
+        assert!(off.cmple(bound).all(), "pixel {i}: {texel:?} for {expected}, off by {off}, bound {bound}");
+        brightest = brightest.max(expected.max_element());
+    }
+    assert!(brightest > 20.0, "the sun is not in view: {brightest}");
+}
+
+#[test]
+fn without_an_environment_everything_is_black() {
+    let mut world = world("sphere", 32, table("mirror-metal"), sky("studio"));
+    world.environment = None;
+    for estimator in [Estimator::Mis, Estimator::Brdf, Estimator::BrdfRandom] {
+        let image = Stage::new(&world, &config(EXTENT, estimator, 8)).frame([0, 0]);
+        assert!(image.texels.iter().all(|t| t[..3] == [0.0; 3]));
+        assert!(image.texels.iter().any(|t| t[3] == 1.0) && image.texels.iter().any(|t| t[3] == 0.0));
+    }
+}

@@ -1,0 +1,100 @@
+//! How fast full-rate shading is, held against a kernel that only looks up. Ignored by default, because it needs a quiet
+//! machine and, for its scene, `scripts/fetch-assets bunny environments`:
+//!
+//! `cargo test --release --test performance -- --ignored --nocapture`
+
+use passband::offline::headless::{Headless, Options};
+use passband::offline::scene::Scene;
+use passband::offline::session::Session;
+use passband::offline::stats::Quantiles;
+use passband::offline::world::World;
+use passband::{Config, Estimator, Requirements};
+
+const ROUNDS: usize = 9;
+
+fn world() -> World {
+    let scene = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/bunny-city.toml");
+    Scene::load(scene, &[]).and_then(|s| s.resolve()).expect("scripts/fetch-assets bunny environments")
+}
+
+fn session(world: &World, estimator: Estimator, directions: u32, size: u32) -> Session {
+    let config = Config { estimator, directions, frames_in_flight: 1, ..Config::new([size, size]) };
+    let options = Options { device: std::env::var("PASSBAND_DEVICE").ok(), validate: false };
+    let headless = Headless::new(&options, &Requirements::of(&config)).unwrap();
+    Session::new(headless, world, &config).unwrap()
+}
+
+fn covered(session: &mut Session) -> u32 {
+    session.frame([0, 0]).unwrap();
+    session.shaded().unwrap()
+}
+
+/// Milliseconds of the shade pass in frames that alternate between the sessions (A B B A …), after two warm-up frames each.
+fn interleaved(sessions: &mut [Session]) -> Vec<Vec<f64>> {
+    let mut times = vec![Vec::new(); sessions.len()];
+    let shade = |s: &Session| s.timings().and_then(|t| t.passes.iter().find(|p| p.0 == "shade").map(|p| p.1)).unwrap();
+    for round in 0..ROUNDS + 2 {
+        let count = sessions.len();
+        for i in 0..count {
+            let i = if round % 2 == 0 { i } else { count - 1 - i };
+            // A frame's times arrive when the next one is recorded, before it runs.
+            sessions[i].frame([0, round as u32]).unwrap();
+            if round >= 2 {
+                times[i].push(shade(&sessions[i]));
+            }
+        }
+    }
+    times
+}
+
+#[test]
+#[ignore = "needs a quiet machine and fetched assets"]
+fn directions_a_second_against_look_ups_only() {
+    let world = world();
+    let mut sessions = [Estimator::Lookup, Estimator::Mis, Estimator::Brdf].map(|e| session(&world, e, 64, 512));
+    println!("device: {}", sessions[0].headless().info().name);
+    let directions = f64::from(covered(&mut sessions[0])) * 64.0;
+    let rates: Vec<_> = interleaved(&mut sessions)
+        .into_iter()
+        .map(|times| {
+            let q = Quantiles::of(times);
+            println!(
+                "{:.1} ms (p10 {:.1}, p90 {:.1}): {:.2} M directions/s",
+                q.median,
+                q.p10,
+                q.p90,
+                directions / q.median / 1e3
+            );
+            directions / q.median / 1e3
+        })
+        .collect();
+    println!("MIS at {:.0} % of the look-up-only kernel's rate", 100.0 * rates[1] / rates[0]);
+    assert!(rates[1] >= 16.0, "{} M directions/s", rates[1]);
+    assert!(rates[1] >= 0.6 * rates[0], "{} of {} M/s", rates[1], rates[0]);
+}
+
+#[test]
+#[ignore = "needs a quiet machine and fetched assets"]
+fn cost_is_linear_in_directions_and_pixels() {
+    let world = world();
+    for (label, cases) in [
+        ("directions at 256x256", [16, 64, 256, 1024].map(|n| (n, 256))),
+        ("size at 64 directions", [128, 256, 512, 1024].map(|size| (64, size))),
+    ] {
+        let mut sessions = cases.map(|(n, size)| session(&world, Estimator::Mis, n, size));
+        let counts: Vec<f64> = sessions.iter_mut().map(|s| f64::from(covered(s))).collect();
+        println!("{label}: directions, covered pixels, shade ms, ns a direction");
+        let costs: Vec<f64> = interleaved(&mut sessions)
+            .into_iter()
+            .zip(cases.iter().zip(&counts))
+            .map(|(times, (&(n, _), &pixels))| {
+                let ms = Quantiles::of(times).median;
+                let ns = ms * 1e6 / (pixels * f64::from(n));
+                println!("| {n} | {pixels} | {ms:.1} | {ns:.1} |");
+                ns
+            })
+            .collect();
+        let (least, most) = costs[1..].iter().fold((f64::MAX, 0.0f64), |(a, b), &c| (a.min(c), b.max(c)));
+        assert!(most < 1.25 * least, "{label}: {costs:?}");
+    }
+}
