@@ -26,8 +26,8 @@ const float TABLE_BORDER = 0.5 + 1.0 / 8192.0;
 
 // By kind:           table               GGX              Blinn-Phong         vMF                turned tables
 //   kind.yz          place in the atlas                                       first lobe, lobes  first table, tables
-//   f0               -                   F0; alpha        specular; exponent  -                  x: tables per radian
-//   albedo           w: scale            albedo           albedo              -                  w: scale
+//   f0               -                   F0; alpha        specular; exponent  1                  x: tables per radian
+//   albedo           w: scale            albedo           albedo              0                  w: scale
 // A lobe is a record of its own: mean direction and concentration in f0, its density at the centre in albedo.x.
 struct MaterialRecord {
     uvec4 kind;  // x: kind of reflectance
@@ -51,12 +51,6 @@ struct Material {
     vec2 turn;       // cosine and sine of the angle from the tangent frame's x axis to the local one
 };
 
-// The tables are in the atlas row by row.
-vec2 material_table(uint slot) {
-    uint columns = uint(textureSize(reflectance_tables, 0).y) / uint(TABLE_SIZE.y);
-    return vec2(slot % columns, slot / columns) * TABLE_SIZE.yz;
-}
-
 Material material_load(uint id, float cos_o, vec2 turn) {
     Material m;
     m.record = materials[id];
@@ -73,56 +67,69 @@ Material material_load(uint id, float cos_o) {
     return material_load(id, cos_o, vec2(1.0, 0.0));
 }
 
-// One table's entry for directions above the horizon, h their half vector; without its scale.
-vec3 material_table_value(vec2 table, vec3 wi, vec3 wo, vec3 h) {
-    vec2 c = vec2(acos_positive(clamp(dot(wo, h), 0.0, 1.0)) * (2.0 * INV_PI), half_warp(h)) * TABLE_SIZE.yz;
+// A table, or tables over the half vector's azimuth (src/reflectance/turned.rs) of which two neighbours are mixed; h is the half
+// vector of directions above the horizon, t the same in the tangent frame.
+vec3 material_tables(Material m, vec3 wi, vec3 wo, vec3 h, vec3 t) {
+    bool turned = m.record.kind.x == REFLECTANCE_TURNED;
     vec2 size = vec2(textureSize(reflectance_tables, 0).yz);
     vec2 border = max(vec2(TABLE_BORDER), 0.5 + size * (1.0 / 4194304.0));
-    c = clamp(c, border, TABLE_SIZE.yz - border) + table;
-    vec3 at = vec3(difference_turn(wi, h), c / size);
-    return textureLod(reflectance_tables, at, 0.0).rgb;
+    vec2 c = vec2(acos_positive(clamp(dot(wo, h), 0.0, 1.0)) * (2.0 * INV_PI), half_warp(h)) * TABLE_SIZE.yz;
+    c = clamp(c, border, TABLE_SIZE.yz - border);
+    float phi_d = difference_turn(wi, h);
+
+    // In floating point, as the reference driver divides integers one by one: numbers are small enough to be exact.
+    float count = float(m.record.kind.z);
+    float columns = round(size.x / TABLE_SIZE.y);
+    float at = turned ? atan_full(t.y, t.x) * m.record.f0.x : 0.0;
+    float node = floor(at);
+    float weight = at - node;
+    vec2 table = m.table;
+    vec3 sum = vec3(0.0);
+    for (uint i = 0u; i < 2u; ++i) {
+        if (turned) {
+            float slot = float(m.record.kind.y) + node - count * floor((node + 0.5) / count);
+            float row = floor((slot + 0.5) / columns);
+            table = vec2(slot - row * columns, row) * TABLE_SIZE.yz;
+        }
+        sum += textureLod(reflectance_tables, vec3(phi_d, (c + table) / size), 0.0).rgb * (i == 0u ? 1.0 - weight : weight);
+        if (!turned) {
+            break;
+        }
+        node += 1.0;
+    }
+    return sum * m.record.albedo.a;
 }
 
-// Tables over the half vector's azimuth (src/reflectance/turned.rs), t in the tangent frame.
-vec3 material_turned_value(Material m, vec3 wi, vec3 wo, vec3 h, vec3 t) {
-    int count = int(m.record.kind.z);
-    float x = atan_full(t.y, t.x) * m.record.f0.x;
-    float first = floor(x);
-    // At most one round of the circle below zero.
-    int node = (int(first) + 64 * count) % count;
-    vec3 a = material_table_value(material_table(m.record.kind.y + uint(node)), wi, wo, h);
-    vec3 b = material_table_value(material_table(m.record.kind.y + uint((node + 1) % count)), wi, wo, h);
-    return mix(a, b, x - first);
-}
-
-// Density of normals of a mixture of vMF lobes (src/reflectance/vmf.rs) at t in the tangent frame, in 1/sr.
-float material_vmf_distribution(Material m, vec3 t) {
+// Density of normals in 1/sr of the two kinds with V-cavity masking: cosine-power (src/reflectance/blinn_phong.rs) and a mixture
+// of vMF lobes (src/reflectance/vmf.rs).
+float material_distribution(Material m, vec3 h, vec3 t) {
+    bool vmf = m.record.kind.x == REFLECTANCE_VMF;
+    uint lobes = vmf ? m.record.kind.z : 1u;
     float sum = 0.0;
-    for (uint i = 0u; i < m.record.kind.z; ++i) {
-        vec4 lobe = materials[m.record.kind.y + i].f0;
-        vec3 d = t - lobe.xyz;
-        sum += materials[m.record.kind.y + i].albedo.x * exp(-0.5 * lobe.w * dot(d, d));
+    for (uint i = 0u; i < lobes; ++i) {
+        // Without lobes of its own, a record stands in, unused.
+        MaterialRecord lobe = materials[vmf ? m.record.kind.y + i : 0u];
+        vec3 d = t - lobe.f0.xyz;
+        float exponent = vmf ? -0.5 * lobe.f0.w * dot(d, d) : blinn_phong_exponent(m.record.f0.a, h);
+        sum += (vmf ? lobe.albedo.x : blinn_phong_peak(m.record.f0.a)) * exp(exponent);
     }
     return sum;
 }
 
-// BRDF in 1/sr for directions above the horizon, h their half vector.
+// BRDF in 1/sr for directions above the horizon, h their half vector. Kinds share what they can and there is no early return:
+// the reference driver runs all branches.
 vec3 material_evaluate(Material m, vec3 wi, vec3 wo, vec3 h) {
-    vec3 rgb = m.record.f0.rgb;
-    vec3 albedo = m.record.albedo.rgb;
-    switch (m.record.kind.x) {
-        case REFLECTANCE_GGX:
-            return ggx_evaluate(rgb, albedo, m.record.f0.a, wi, wo, h);
-        case REFLECTANCE_BLINN_PHONG:
-            return blinn_phong_evaluate(rgb, albedo, m.record.f0.a, wi, wo, h);
-        case REFLECTANCE_TABLE:
-            return material_table_value(m.table, wi, wo, h) * m.record.albedo.a;
-    }
+    uint kind = m.record.kind.x;
     vec3 t = vec3(m.turn.x * h.x - m.turn.y * h.y, m.turn.y * h.x + m.turn.x * h.y, h.z);
-    if (m.record.kind.x == REFLECTANCE_VMF) {
-        return vec3(material_vmf_distribution(m, t) * cavity_masking(wi, wo, h));
+    vec3 value;
+    if (kind == REFLECTANCE_TABLE || kind == REFLECTANCE_TURNED) {
+        value = material_tables(m, wi, wo, h, t);
+    } else if (kind == REFLECTANCE_GGX) {
+        value = ggx_evaluate(m.record.f0.rgb, m.record.albedo.rgb, m.record.f0.a, wi, wo, h);
+    } else {
+        value = m.record.f0.rgb * (material_distribution(m, h, t) * cavity_masking(wi, wo, h)) + m.record.albedo.rgb * INV_PI;
     }
-    return material_turned_value(m, wi, wo, h, t) * m.record.albedo.a;
+    return value;
 }
 
 // A half vector, and its density in 1/sr of h, from two 32-bit numbers (Bagher 2011, section 3.3).

@@ -125,7 +125,7 @@ fn records(models: &[Model], tables: &Tables<'_>, columns: u32) -> Vec<Record> {
                         albedo: [*peak as f32, 0.0, 0.0, 0.0],
                     };
                     lobes.extend(vmf.lobes().iter().zip(vmf.peaks()).map(lobe));
-                    Record { kind: [3, first as u32, vmf.lobes().len() as u32, 0], f0: [0.0; 4], albedo: [0.0; 4] }
+                    Record { kind: [3, first as u32, vmf.lobes().len() as u32, 0], f0: [1.0; 4], albedo: [0.0; 4] }
                 }
                 Model::Turned(turned) => {
                     let kind = [4, slot, turned.nodes().len() as u32, 0];
