@@ -37,6 +37,7 @@ fn world() -> World {
         camera: Camera { position: scene::EYE, target: scene::TARGET, up: glam::DVec3::Y, fov_y: scene::FOV_Y },
         size: None,
         environment: Some(EnvironmentLight { map: scene::sky().unwrap(), intensity: 1.0, rotation: 0.0, visible: false }),
+        lights: Vec::new(),
         objects: objects.collect(),
         materials: scene::materials().into_iter().enumerate().map(material).collect(),
     }

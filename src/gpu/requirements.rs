@@ -57,7 +57,6 @@ impl Requirements {
                 (vk::Format::R16G16B16A16_SFLOAT, sampled | F::STORAGE_IMAGE),
                 (vk::Format::R32_UINT, sampled | F::COLOR_ATTACHMENT),
                 (vk::Format::R32G32_SFLOAT, sampled | F::COLOR_ATTACHMENT),
-                (vk::Format::R32G32_UINT, sampled),
                 (vk::Format::R16_SFLOAT, filtered),
                 (vk::Format::E5B9G9R9_UFLOAT_PACK32, filtered),
                 (vk::Format::D32_SFLOAT, F::DEPTH_STENCIL_ATTACHMENT),

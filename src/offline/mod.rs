@@ -5,6 +5,7 @@ pub mod aov;
 pub mod builtin;
 pub mod environment;
 pub mod error;
+pub mod gltf;
 pub mod headless;
 pub mod image_io;
 mod input;

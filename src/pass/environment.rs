@@ -46,7 +46,7 @@ impl EnvironmentUpload {
             usage: vk::ImageUsageFlags::SAMPLED,
         };
         let radiance_desc = desc("environment", vk::Format::R32G32B32A32_SFLOAT, [map.width(), map.height()]);
-        let entries_desc = desc("environment entries", vk::Format::R32G32_UINT, extent);
+        let entries_desc = desc("environment entries", vk::Format::R32_UINT, extent);
         Ok(Self {
             map: ImageUpload::new(build, radiance_desc, bytemuck::cast_slice(&radiance))?,
             entries: ImageUpload::new(build, entries_desc, bytemuck::cast_slice(&entries))?,

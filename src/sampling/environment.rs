@@ -1,12 +1,11 @@
 //! Directions in proportion to an environment's light. The density is the *bilinear* interpolation of a weight per texel,
-//! drawn exactly: a row by inversion, a texel of the row by an alias table, then a tent-distributed offset of up to one texel
-//! around its centre, since a bilinear surface is a sum of tents. Rows by inversion keep the sun's share of well-spread
-//! points: one alias table over all texels scatters it, and left 17x the error on a mirror-like sphere under a small sun. Twin of `glsl/include/environment.glsl`.
+//! drawn exactly: a row, a texel of the row, then a tent-distributed offset of up to one texel around its centre, since a
+//! bilinear surface is a sum of tents. Rows and texels are drawn by inversion, which keeps well-spread points well spread
+//! within the sun; alias tables, over all texels or in each row, scatter them. Twin of `glsl/include/environment.glsl`.
 
 use crate::error::Result;
-use crate::sampling::inversion::Interval;
 use crate::sampling::latlong::{LatLong, direction, uv};
-use crate::sampling::{AliasTable, InversionTable, luminance};
+use crate::sampling::{InversionTable, luminance};
 use glam::{DVec2, DVec3};
 use std::f64::consts::PI;
 
@@ -20,7 +19,7 @@ const LEAST_SIN: f64 = 1e-9;
 pub struct EnvironmentImportance {
     rows: InversionTable,
     /// One table a row.
-    columns: Vec<AliasTable>,
+    columns: Vec<InversionTable>,
     density: LatLong,
 }
 
@@ -37,12 +36,12 @@ impl EnvironmentImportance {
         let floor = if mean > 0.0 { FLOOR * mean } else { 1.0 };
         let weights: Vec<f64> = map.texels().iter().enumerate().map(|(i, &t)| light(t).max(floor) * sine(i)).collect();
 
-        let columns = weights.chunks_exact(width).map(AliasTable::build).collect::<Result<Vec<_>>>()?;
+        let columns = weights.chunks_exact(width).map(InversionTable::build).collect::<Result<Vec<_>>>()?;
         let rows = InversionTable::build(&weights.chunks_exact(width).map(|row| row.iter().sum()).collect::<Vec<f64>>())?;
         let texels = (width * height) as f64;
-        let row_density = |(row, table): (usize, &AliasTable)| {
+        let row_density = |(row, table): (usize, &InversionTable)| {
             let share = texels * rows.probability(row);
-            table.probabilities().into_iter().map(move |p| [(share * p) as f32; 3])
+            (0..width).map(move |column| [(share * table.probability(column)) as f32; 3])
         };
         let density = columns.iter().enumerate().flat_map(row_density).collect();
         Ok(Self { rows, columns, density: LatLong::new(map.width(), map.height(), density)? })
@@ -54,29 +53,27 @@ impl EnvironmentImportance {
         self.density.texels().iter().map(|t| t[0]).collect()
     }
 
-    /// What the GPU draws from, as an image of word pairs with its extent: each texel's alias entry (threshold as float bits,
-    /// alias) in its row; the rows' intervals (start, guide) in one more row below, or in one more column where the map is
-    /// taller than wide.
-    pub fn entries(&self) -> ([u32; 2], Vec<[u32; 2]>) {
-        let (width, height) = (self.density.width(), self.density.height());
-        let tall = height > width;
-        let interval = |i: &Interval| [i.start, i.guide];
-        let mut image = Vec::new();
-        for (columns, row) in self.columns.iter().zip(self.rows.intervals()) {
-            image.extend(columns.entries().iter().map(|e| [e.threshold.to_bits(), e.alias]));
-            image.extend(tall.then_some(interval(row)));
+    /// What the GPU draws from, as an image of words with its extent: in rows 0 to h - 1 where each texel's interval in its row
+    /// begins, in rows h to 2h - 1 the row's guide, and in the last two rows the same for the rows themselves. A guide word
+    /// is the first index in its part of the uniform numbers, and the last one shifted by 16.
+    pub fn entries(&self) -> ([u32; 2], Vec<u32>) {
+        let (width, height) = (self.density.width() as usize, self.density.height() as usize);
+        let stride = width.max(height);
+        let mut image = vec![0; stride * (2 * height + 2)];
+        let tables = self.columns.iter().enumerate().map(|(row, table)| (table, row, height + row));
+        for (table, starts, guides) in tables.chain([(&self.rows, 2 * height, 2 * height + 1)]) {
+            let mut first = 0;
+            for (i, interval) in table.intervals().iter().enumerate() {
+                image[starts * stride + i] = interval.start;
+                image[guides * stride + i] = first | interval.guide << 16;
+                first = interval.guide;
+            }
         }
-        if tall {
-            return ([width + 1, height], image);
-        }
-        image.extend(self.rows.intervals().iter().map(interval));
-        image.resize(width as usize * (height as usize + 1), [0; 2]);
-        ([width, height + 1], image)
+        ([stride as u32, 2 * height as u32 + 2], image)
     }
 
     /// A direction and its density per steradian, from two uniforms as fractions of 2^32: the second picks the row and, by
-    /// its place in the row's interval, the offset in v; the first the texel and, by what
-    /// the alias table leaves of it, the offset in u. Offsets wrap in u
+    /// its place in the row's interval, the offset in v; the first likewise the texel and the offset in u. Offsets wrap in u
     /// and are reflected at the poles, which equals bilinear interpolation clamped there.
     pub fn sample(&self, u: [u32; 2]) -> (DVec3, f64) {
         let (row, down) = self.rows.draw(u[1]);

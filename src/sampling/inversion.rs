@@ -1,5 +1,5 @@
 //! Drawing an index in proportion to weights by inverting their cumulative sums. Every index owns one interval of the uniform
-//! numbers, so that numbers that are well spread stay well spread within each index. The alias method (`alias.rs`) needs
+//! numbers, so that numbers that are well spread stay well spread within each index. The alias method (Walker 1977) needs
 //! fewer look-ups, but scatters a heavy index over the whole range. A guide finds the interval in few steps (Chen and Asau
 //! 1974, "On generating random variates from an empirical distribution"). Twin of `glsl/include/environment.glsl`.
 

@@ -1,11 +1,23 @@
-//! Indexed triangle meshes.
+//! Indexed triangle meshes: files, formulas, texture coordinates and tangents.
 
+use crate::offline::error::{At, Error, Result};
+use crate::offline::{gltf, input};
 use std::collections::HashMap;
+use std::path::Path;
 
+mod atlas;
+mod gzip;
 mod obj;
+mod off;
+mod ply;
 pub(crate) mod shapes;
+mod split;
+mod tangents;
+mod uv;
 
+pub use atlas::cache_folder;
 pub use obj::read_obj;
+pub use uv::Projection;
 
 /// A triangle mesh in object space (right-handed, metres). All attributes are per vertex.
 #[derive(Clone, Debug, Default)]
@@ -14,12 +26,132 @@ pub struct Mesh {
     pub positions: Vec<[f32; 3]>,
     /// Unit normals, one per position.
     pub normals: Vec<[f32; 3]>,
-    /// Texture coordinates, one per position; zero where `has_uvs` is false.
+    /// Texture coordinates, one per position, `v` upwards; zero where `has_uvs` is false.
     pub uvs: Vec<[f32; 2]>,
-    /// Whether the source carried texture coordinates.
+    /// Whether the source carried texture coordinates, or they were generated.
     pub has_uvs: bool,
+    /// Unit tangents (direction of growing `u`, across the normal) and handedness: the direction of growing `v` is
+    /// `w * cross(normal, tangent)`. One per position, or none at all until [`Mesh::compute_tangents`].
+    pub tangents: Vec<[f32; 4]>,
     /// Three indices a triangle.
     pub indices: Vec<u32>,
+}
+
+/// Reads a mesh in the format of `path`'s extension: `.obj`, `.ply`, `.off`, or `.glb` and `.gltf` with all their
+/// primitives as one mesh. Each may end in `.gz`; files that a `.gltf` names are read as they are.
+///
+/// # Errors
+/// [`Error::Argument`] for another extension, [`Error::File`] for a file that is not such a mesh: malformed, damaged, with
+/// numbers that are not finite, indices out of range or no triangle, or compressed beyond what any mesh is.
+pub fn read(path: &Path) -> Result<Mesh> {
+    let (kind, _) = kind(path);
+    match kind.as_str() {
+        "obj" => obj::parse(path, &content(path)?),
+        "ply" => ply::parse(path, &content(path)?),
+        "off" => off::parse(path, &content(path)?),
+        "glb" | "gltf" => gltf::read_mesh(path),
+        other => {
+            let expected = "a name that ends in .obj, .ply, .off, .glb or .gltf, or these with .gz";
+            Err(Error::argument("mesh", expected, format!("`.{other}`")))
+        }
+    }
+}
+
+/// A mesh file's extension before any `.gz`, in lower case, and whether there is one.
+fn kind(path: &Path) -> (String, bool) {
+    match input::extension(path).as_str() {
+        "gz" => (path.file_stem().map(|stem| input::extension(Path::new(stem))).unwrap_or_default(), true),
+        other => (other.to_string(), false),
+    }
+}
+
+/// A mesh file's bytes, decompressed if its name ends in `.gz`.
+pub(crate) fn content(path: &Path) -> Result<Vec<u8>> {
+    let bytes = input::read(path)?;
+    if kind(path).1 { gzip::decompress(path, &bytes) } else { Ok(bytes) }
+}
+
+impl Mesh {
+    /// Whether every index has a vertex, every vertex its attributes, and corners and vertices can be counted in 32 bits.
+    pub fn is_consistent(&self) -> bool {
+        let count = self.positions.len();
+        let whole = self.indices.len().is_multiple_of(3) && self.indices.len() < u32::MAX as usize;
+        whole
+            && count < u32::MAX as usize
+            && self.normals.len() == count
+            && self.uvs.len() == count
+            && (self.tangents.is_empty() || self.tangents.len() == count)
+            && self.indices.iter().all(|i| (*i as usize) < count)
+    }
+
+    fn require_consistent(&self) -> Result<()> {
+        if self.is_consistent() {
+            return Ok(());
+        }
+        let got = format!("{} vertices and {} indices that do not fit", self.positions.len(), self.indices.len());
+        Err(Error::argument("mesh", "attributes for every vertex and a vertex for every index", got))
+    }
+}
+
+/// What a file said, before it is a mesh.
+#[derive(Default)]
+struct Parts {
+    positions: Vec<[f32; 3]>,
+    /// One per position, or none; of any length.
+    normals: Vec<[f32; 3]>,
+    /// One per position, or none.
+    uvs: Vec<[f32; 2]>,
+    /// Within the positions.
+    indices: Vec<u32>,
+}
+
+impl Parts {
+    /// Adds a polygon as a fan about its first corner.
+    fn fan(&mut self, corners: &[u32]) {
+        if let Some((first, rest)) = corners.split_first() {
+            self.indices.extend(rest.windows(2).flat_map(|pair| std::iter::once(*first).chain(pair.iter().copied())));
+        }
+    }
+
+    /// The mesh, with unit normals: those without length, and all if there are none, are weighted by area.
+    fn finish(self, path: &Path) -> Result<Mesh> {
+        fn first_bad<const N: usize>(all: &[[f32; N]]) -> Option<usize> {
+            all.iter().position(|v| !v.iter().all(|c| c.is_finite()))
+        }
+        let named = [
+            ("position", first_bad(&self.positions)),
+            ("normal", first_bad(&self.normals)),
+            ("texture coordinate", first_bad(&self.uvs)),
+        ];
+        for (name, bad) in named {
+            if let Some(bad) = bad {
+                return Err(Error::file(path, At::File, format!("vertex {bad}: {name}"), "finite numbers", "another"));
+            }
+        }
+        if self.indices.len() < 3 {
+            return Err(Error::file(path, At::File, "faces", "at least one triangle", "none"));
+        }
+        let count = self.positions.len();
+        if count >= u32::MAX as usize || self.indices.len() >= u32::MAX as usize {
+            let got = format!("{count} vertices and {} corners", self.indices.len());
+            return Err(Error::file(path, At::File, "size", "fewer than 2^32 vertices and corners", got));
+        }
+        let unit = |n: &[f32; 3]| glam::Vec3::from(*n).as_dvec3().try_normalize().map(|n| n.as_vec3().to_array());
+        let own: Option<Vec<[f32; 3]>> = self.normals.iter().map(unit).collect();
+        let normals = match own.filter(|own| own.len() == count) {
+            Some(own) => own,
+            None => {
+                let mut normals = area_weighted_normals(&self.positions, &self.indices);
+                for (normal, own) in normals.iter_mut().zip(&self.normals) {
+                    *normal = unit(own).unwrap_or(*normal);
+                }
+                normals
+            }
+        };
+        let has_uvs = self.uvs.len() == count;
+        let uvs = if has_uvs { self.uvs } else { vec![[0.0; 2]; count] };
+        Ok(Mesh { positions: self.positions, normals, uvs, has_uvs, tangents: Vec::new(), indices: self.indices })
+    }
 }
 
 /// Unit normals from faces, weighted by their area: one per position, equal where positions are equal, so that a texture

@@ -14,10 +14,14 @@ use std::path::Path;
 /// [`Error::File`] with the line of a position, normal or coordinate that is not finite and of an index that is out of
 /// range; without one if there are no triangles.
 pub fn read_obj(path: &Path) -> Result<Mesh> {
-    let bytes = input::read(path)?;
-    check(path, &String::from_utf8_lossy(&bytes))?;
+    parse(path, &input::read(path)?)
+}
+
+/// [`read_obj`] of a file's content.
+pub(super) fn parse(path: &Path, bytes: &[u8]) -> Result<Mesh> {
+    let text = String::from_utf8_lossy(bytes);
+    check(path, &text)?;
     let options = tobj::LoadOptions { single_index: true, triangulate: true, ignore_points: true, ignore_lines: true };
-    let text = String::from_utf8_lossy(&bytes);
     let loaded = tobj::load_obj_buf(&mut text.as_bytes(), &options, |_| Ok(Default::default()));
     let (groups, _) = loaded.map_err(|e| Error::file(path, At::File, "OBJ", "a well-formed Wavefront OBJ", e))?;
 

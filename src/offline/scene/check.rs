@@ -16,7 +16,11 @@ use toml::Spanned;
 /// Checks a whole scene.
 pub(super) fn scene(source: &Source, file: &SceneFile) -> Result<()> {
     let mut check = Check { source, later: Vec::new() };
-    check.camera(&file.camera)?;
+    match &file.camera {
+        Some(camera) => check.camera(camera)?,
+        None if file.objects.get_ref().iter().any(|object| object.get_ref().is_gltf()) => {}
+        None => return Err(source.missing(&(0..0), "camera", "a table, unless a glTF mesh has a camera")),
+    }
     if let Some(environment) = &file.environment {
         check.environment(environment)?;
     }
@@ -83,19 +87,20 @@ impl Check<'_> {
         self.each(&o.mesh, |c, v| {
             let stem = v.get_ref().to_lowercase();
             let plain = Spanned::new(v.span(), stem.strip_suffix(".gz").unwrap_or(&stem).to_string());
-            let kind = c.extension(&plain, &["obj", "ply", "off", "glb", "gltf"])?;
-            if kind != "obj" || stem.ends_with(".gz") {
-                c.later.push(v.span());
-            }
-            Ok(())
+            c.extension(&plain, &["obj", "ply", "off", "glb", "gltf"]).map(drop)
         })?;
         self.each(&o.builtin, |c, v| c.name(v, &builtin::MESHES))?;
-        if !file.materials.contains_key(o.material.get_ref()) {
-            let names: Vec<_> = file.materials.keys().map(String::as_str).collect();
-            let expected = if names.is_empty() { "a [materials.NAME] table".to_string() } else { names.join(", ") };
-            return Err(self.source.error(&o.material.span(), expected, format!("`{}`", o.material.get_ref())));
+        match &o.material {
+            None if o.is_gltf() => {}
+            None => return Err(self.source.missing(&object.span(), "material", "a name, unless the mesh is glTF")),
+            Some(name) if file.materials.contains_key(name.get_ref()) => {}
+            Some(name) => {
+                let names: Vec<_> = file.materials.keys().map(String::as_str).collect();
+                let expected = if names.is_empty() { "a [materials.NAME] table".to_string() } else { names.join(", ") };
+                return Err(self.source.error(&name.span(), expected, format!("`{}`", name.get_ref())));
+            }
         }
-        self.each(&o.uv, |c, v| c.name(v, &["spherical", "box", "atlas"]).map(|()| c.later.push(v.span())))?;
+        self.each(&o.uv, |c, v| c.name(v, &["spherical", "box", "atlas"]))?;
         self.each(&o.translate, Self::vector)?;
         self.each(&o.rotate, Self::vector)?;
         self.each(&o.scale, Self::scale)?;
@@ -253,6 +258,15 @@ impl Check<'_> {
 /// Where a key's value stands, if it is there.
 pub(super) fn span<T>(key: &Option<Spanned<T>>) -> Option<Span> {
     key.as_ref().map(Spanned::span)
+}
+
+impl Object {
+    /// Whether the mesh is a file that has materials and cameras of its own.
+    pub(super) fn is_gltf(&self) -> bool {
+        let name = self.mesh.as_ref().map_or(String::new(), |mesh| mesh.get_ref().to_lowercase());
+        let name = name.strip_suffix(".gz").unwrap_or(&name);
+        name.ends_with(".glb") || name.ends_with(".gltf")
+    }
 }
 
 impl Camera {

@@ -3,7 +3,8 @@
 //!
 //! Beside the format's own wording: `rotate` turns about X, then Y, then Z; translation comes last and scaling first.
 //! Colours and scales may be one number for all three. Keyframes carry their `frame`; animated objects are
-//! `[[animation.objects]]` with `object = INDEX` and `keyframes = [...]`.
+//! `[[animation.objects]]` with `object = INDEX` and `keyframes = [...]`. An object whose mesh is a glTF file may leave out
+//! `material`: it then has the file's own; and `[camera]` may be left out if such a file has one.
 
 use serde::Deserialize;
 use std::collections::BTreeMap;
@@ -15,7 +16,7 @@ pub(super) type Vector = [f64; 3];
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct SceneFile {
-    pub camera: Camera,
+    pub camera: Option<Camera>,
     pub environment: Key<Environment>,
     #[serde(default)]
     pub lights: Vec<Spanned<Light>>,
@@ -67,7 +68,7 @@ pub(super) struct Light {
 pub(super) struct Object {
     pub mesh: Key<String>,
     pub builtin: Key<String>,
-    pub material: Spanned<String>,
+    pub material: Key<String>,
     pub uv: Key<String>,
     pub translate: Key<Vector>,
     pub rotate: Key<Vector>,

@@ -1,11 +1,13 @@
 //! From a checked scene file to everything in memory.
 
-use crate::offline::error::Result;
-use crate::offline::mesh::{self, Mesh};
-use crate::offline::scene::format::{Object as ObjectKeys, Triple};
+use crate::offline::error::{Error, Result};
+use crate::offline::gltf;
+use crate::offline::mesh::{self, Mesh, Projection};
+use crate::offline::scene::format::{Camera as CameraKeys, Object as ObjectKeys, Triple};
 use crate::offline::scene::{Scene, lights, materials};
 use crate::offline::world::{Camera, EnvironmentLight, Material, Object, World};
 use crate::offline::{builtin, environment};
+use crate::reflectance::Model;
 use glam::{DMat4, DQuat, DVec3, EulerRot};
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -13,36 +15,59 @@ use toml::Spanned;
 
 pub(super) fn world(scene: &Scene) -> Result<World> {
     let file = &scene.file;
-    let camera = Camera {
-        position: file.camera.position(),
-        target: file.camera.target(),
-        up: file.camera.up(),
-        fov_y: number(&file.camera.fov_y, 40.0),
-    };
     let mut models = materials::Models::default();
     let mut all = Vec::new();
     for (name, material) in &file.materials {
         let model = models.get(scene, material.get_ref().reflectance.get_ref())?;
         all.push(Material { name: name.clone(), model });
     }
-    let mut meshes = HashMap::new();
+    let mut known = Known::default();
     let mut objects = Vec::new();
+    let mut file_camera = None;
     for object in file.objects.get_ref() {
         let object = object.get_ref();
-        let mesh = shared_mesh(scene, object, &mut meshes)?;
-        // Known since the check; the names are the map's own.
-        let material = file.materials.keys().position(|name| name == object.material.get_ref()).unwrap_or_default();
-        objects.push(Object { mesh, transform: transform(object).as_mat4(), material });
+        let transform = transform(object);
+        if let Some(name) = &object.material {
+            // Known since the check; the names are the map's own.
+            let material = file.materials.keys().position(|known| known == name.get_ref()).unwrap_or_default();
+            objects.push(Object { mesh: known.mesh(scene, object)?, transform: transform.as_mat4(), material });
+        }
+        if object.is_gltf() && (object.material.is_none() || (file.camera.is_none() && file_camera.is_none())) {
+            let model = known.model(scene, object, &mut all)?;
+            file_camera = file_camera.or(model.camera.map(|camera| moved(camera, transform)));
+            if object.material.is_none() {
+                let placed = |(mesh, material): &(Arc<Mesh>, usize)| Object {
+                    mesh: Arc::clone(mesh),
+                    transform: transform.as_mat4(),
+                    material: *material,
+                };
+                objects.extend(model.primitives.iter().map(placed));
+            }
+        }
     }
+    let own = file.camera.as_ref().map(camera);
+    let none = || scene.source.missing(&(0..0), "camera", "a table, as no glTF mesh has a perspective camera");
+    let camera = own.or(file_camera).ok_or_else(none)?;
     Ok(World {
         name: scene.name.clone(),
         camera,
-        size: file.camera.size.as_ref().map(|size| *size.get_ref()),
+        size: file.camera.as_ref().and_then(|camera| camera.size.as_ref()).map(|size| *size.get_ref()),
         environment: environment_light(scene)?,
         lights: lights::lights(file),
         objects,
         materials: all,
     })
+}
+
+fn camera(keys: &CameraKeys) -> Camera {
+    Camera { position: keys.position(), target: keys.target(), up: keys.up(), fov_y: number(&keys.fov_y, 40.0) }
+}
+
+/// A file's camera, placed like the file's object.
+fn moved(camera: Camera, transform: DMat4) -> Camera {
+    let point = |p| transform.transform_point3(p);
+    let up = transform.transform_vector3(camera.up);
+    Camera { position: point(camera.position), target: point(camera.target), up, ..camera }
 }
 
 fn environment_light(scene: &Scene) -> Result<Option<EnvironmentLight>> {
@@ -56,24 +81,71 @@ fn environment_light(scene: &Scene) -> Result<Option<EnvironmentLight>> {
     Ok(Some(EnvironmentLight { map, intensity, rotation: number(&keys.rotation, 0.0), visible: keys.visible }))
 }
 
-/// The object's mesh; one that several objects use is loaded once.
-fn shared_mesh(scene: &Scene, object: &ObjectKeys, meshes: &mut HashMap<String, Arc<Mesh>>) -> Result<Arc<Mesh>> {
-    let (key, file, name) = match (&object.mesh, &object.builtin) {
-        (Some(file), _) => (format!("file {}", file.get_ref()), Some(file.get_ref()), ""),
-        (None, name) => {
-            let name = name.as_ref().map_or("", |name| name.get_ref().as_str());
-            (format!("built-in {name}"), None, name)
+/// Meshes that have been loaded or made so far: one that several objects use is there once.
+#[derive(Default)]
+struct Known {
+    meshes: HashMap<String, Arc<Mesh>>,
+    models: HashMap<String, Arc<Parts>>,
+}
+
+/// A glTF file with its own materials.
+struct Parts {
+    /// With indices into the world's materials.
+    primitives: Vec<(Arc<Mesh>, usize)>,
+    camera: Option<Camera>,
+}
+
+impl Known {
+    /// The whole mesh of an object.
+    fn mesh(&mut self, scene: &Scene, object: &ObjectKeys) -> Result<Arc<Mesh>> {
+        let name = |key: &Option<Spanned<String>>| key.as_ref().map_or(String::new(), |name| name.get_ref().clone());
+        let key = format!("{} {} {}", name(&object.mesh), name(&object.builtin), name(&object.uv));
+        if let Some(mesh) = self.meshes.get(&key) {
+            return Ok(Arc::clone(mesh));
         }
-    };
-    if let Some(mesh) = meshes.get(&key) {
-        return Ok(Arc::clone(mesh));
+        let mut mesh = match &object.mesh {
+            Some(file) => mesh::read(&scene.folder.join(file.get_ref()))?,
+            None => builtin::mesh(&name(&object.builtin), builtin::DEFAULT_DETAIL)?,
+        };
+        project(&mut mesh, scene, object)?;
+        let mesh = Arc::new(mesh);
+        self.meshes.insert(key, Arc::clone(&mesh));
+        Ok(mesh)
     }
-    let mesh = Arc::new(match file {
-        Some(file) => mesh::read_obj(&scene.folder.join(file))?,
-        None => builtin::mesh(name, builtin::DEFAULT_DETAIL)?,
-    });
-    meshes.insert(key, Arc::clone(&mesh));
-    Ok(mesh)
+
+    /// The parts of a glTF object, whose materials are added to `materials` the first time; only its camera if the object
+    /// has a material of the scene.
+    fn model(&mut self, scene: &Scene, object: &ObjectKeys, materials: &mut Vec<Material>) -> Result<Arc<Parts>> {
+        let name = object.mesh.as_ref().map_or("", |file| file.get_ref());
+        let key = format!("{name} {}", object.uv.as_ref().map_or("", |uv| uv.get_ref()));
+        if let Some(parts) = self.models.get(&key) {
+            return Ok(Arc::clone(parts));
+        }
+        let file = gltf::read(&scene.folder.join(name))?;
+        if object.material.is_some() {
+            return Ok(Arc::new(Parts { primitives: Vec::new(), camera: file.camera }));
+        }
+        let first = materials.len();
+        materials.extend(file.materials.into_iter().map(|m| Material { model: Model::Ggx(m.ggx()), name: m.name }));
+        let mut primitives = Vec::new();
+        for mut primitive in file.primitives {
+            project(&mut primitive.mesh, scene, object)?;
+            primitives.push((Arc::new(primitive.mesh), first + primitive.material));
+        }
+        let parts = Arc::new(Parts { primitives, camera: file.camera });
+        self.models.insert(key, Arc::clone(&parts));
+        Ok(parts)
+    }
+}
+
+/// Gives a mesh the texture coordinates that its object asks for, in the place of its own.
+fn project(mesh: &mut Mesh, scene: &Scene, object: &ObjectKeys) -> Result<()> {
+    let Some(uv) = &object.uv else { return Ok(()) };
+    let Some(projection) = Projection::named(uv.get_ref()) else { return Ok(()) };
+    mesh.generate_uvs(projection, mesh::cache_folder().as_deref()).map_err(|e| match e {
+        Error::Argument { expected, got, .. } => scene.source.error(&uv.span(), expected, got),
+        other => other,
+    })
 }
 
 /// World from object: scaled, turned about X, then Y, then Z, then moved; or as given.

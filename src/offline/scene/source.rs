@@ -56,6 +56,12 @@ impl Source {
         Error::NotSupportedYet { what: format!("{place} {}", self.field(span)) }
     }
 
+    /// That the table at `span` lacks the key `name`; an empty span is the whole file.
+    pub(super) fn missing(&self, span: &Span, name: &str, expected: &str) -> Error {
+        let field = if span.is_empty() { String::new() } else { self.field(span) + "." };
+        self.error_of(span, field + name, expected, "none")
+    }
+
     fn error_of(&self, span: &Span, field: String, expected: impl Into<String>, got: impl ToString) -> Error {
         match self.override_at(span) {
             Some(path) if field.is_empty() => Error::argument(format!("--set {path}"), expected, got),
