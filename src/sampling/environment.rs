@@ -39,11 +39,11 @@ impl EnvironmentImportance {
         let columns = weights.chunks_exact(width).map(InversionTable::build).collect::<Result<Vec<_>>>()?;
         let rows = InversionTable::build(&weights.chunks_exact(width).map(|row| row.iter().sum()).collect::<Vec<f64>>())?;
         let texels = (width * height) as f64;
-        let row_density = |(row, table): (usize, &InversionTable)| {
+        let row_density = columns.iter().enumerate().flat_map(|(row, table)| {
             let share = texels * rows.probability(row);
             (0..width).map(move |column| [(share * table.probability(column)) as f32; 3])
-        };
-        let density = columns.iter().enumerate().flat_map(row_density).collect();
+        });
+        let density = row_density.collect();
         Ok(Self { rows, columns, density: LatLong::new(map.width(), map.height(), density)? })
     }
 
