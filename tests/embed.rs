@@ -28,6 +28,7 @@ fn world() -> World {
             positions: o.positions,
             normals: o.normals,
             has_uvs: false,
+            tangents: Vec::new(),
             indices: o.indices,
         }),
     });

@@ -227,7 +227,9 @@ fn microfacet_normals_fill_the_projected_area() {
 
 #[test]
 fn stand_ins_are_what_they_are_called() {
-    assert_eq!(stand_in::names(), ["mirror-metal", "metallic-paint", "rough"]);
+    let names =
+        ["mirror-metal", "metallic-paint", "rough", "red-paint", "shift-paint", "gloss-plastic", "satin", "rubber", "felt"];
+    assert_eq!(stand_in::names(), names);
     assert!(stand_in::table("chrome").is_none());
     let normal = |name: &str| stand_in::table(name).unwrap().evaluate(DVec3::Z, DVec3::Z);
     let [metal, paint, rough] = ["mirror-metal", "metallic-paint", "rough"].map(normal);
@@ -238,6 +240,30 @@ fn stand_ins_are_what_they_are_called() {
     assert!((paint.y / (0.3 * (0.6 / 0.0225 + 0.4 / 0.1225) / (4.0 * PI) + diffuse) - 1.0).abs() < 0.01, "{paint}");
     let diffuse = 0.5 * 0.96 / PI;
     assert!((rough.x / (0.04 / 0.2025 / (4.0 * PI) + diffuse) - 1.0).abs() < 0.01, "{rough}");
+}
+
+#[test]
+fn stand_ins_differ_in_the_way_they_are_named() {
+    let at = |name: &str, half: f64, diff: f64, phi: f64| {
+        let angles = Angles { theta_half: half.to_radians(), theta_diff: diff.to_radians(), phi_diff: phi.to_radians() };
+        let (wi, wo) = angles.directions();
+        stand_in::table(name).unwrap().evaluate(wi, wo)
+    };
+    // The paint that shifts its colour: green over red face on, red over green aslant; the others keep their order.
+    let (face, aslant) = (at("shift-paint", 10.0, 5.0, 90.0), at("shift-paint", 10.0, 65.0, 90.0));
+    assert!(face.y > 2.0 * face.x && aslant.x > 2.0 * aslant.y, "{face} {aslant}");
+    let (face, aslant) = (at("red-paint", 10.0, 5.0, 90.0), at("red-paint", 10.0, 65.0, 90.0));
+    assert!(face.x > 2.0 * face.y && aslant.x > aslant.y, "{face} {aslant}");
+    // How sharp: the value 6 degrees off the peak over that at the peak.
+    let falloff = |name: &str| at(name, 6.0, 20.0, 90.0).y / at(name, 0.2, 20.0, 90.0).y;
+    let order = ["mirror-metal", "gloss-plastic", "red-paint", "satin", "rubber"].map(falloff);
+    assert!(order.is_sorted_by(|a, b| a < b) && order[0] < 0.02 && order[4] > 0.9, "{order:?}");
+    // Felt throws light back where it came from, and more so at the rim; rubber does neither.
+    let back = |name: &str, degrees: f64| at(name, degrees, 1.0, 90.0).y / at(name, 1.0, degrees, 90.0).y;
+    assert!(back("felt", 70.0) > 1.5 && back("felt", 70.0) > 1.5 * back("felt", 30.0), "{}", back("felt", 70.0));
+    assert!(back("rubber", 70.0) < 1.1, "{}", back("rubber", 70.0));
+    // Rubber is dark.
+    assert!(at("rubber", 20.0, 20.0, 90.0).max_element() < 0.1 * at("rough", 20.0, 20.0, 90.0).max_element() + 0.02);
 }
 
 #[test]

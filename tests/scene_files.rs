@@ -153,16 +153,6 @@ fn keys_that_do_not_work_yet_say_so() {
     for (mark, text, key) in &lines {
         not_yet(&with(mark, text), key);
     }
-    let reflectances = [
-        "sgd = { table = 'sgd.csv', name = 'gold-paint' }",
-        "rgl = 'x.bsdf'",
-        "blinn_phong = { exponent = 10, specular = 0.5, albedo = [0.1, 0.2, 0.3] }",
-        "vmf = [{ mu = [0, 0, 1], kappa = 10, weight = 1 }]",
-    ];
-    for text in reflectances {
-        let scene = with("material", &format!("[materials.other]\nreflectance = {{ {text} }}"));
-        not_yet(&scene, text.split(' ').next().unwrap());
-    }
 }
 
 fn not_yet(text: &str, key: &str) {

@@ -1,12 +1,18 @@
 // The accessors through which every pass reads materials. A host with its own reflectance replaces this file.
-// Local frame: z is the normal, the viewer is in the half plane y = 0, x >= 0.
+// Local frame: z is the normal, the viewer is in the half plane y = 0, x >= 0. Kinds that are not isotropic turn it into the
+// surface's tangent frame.
 #ifndef BRIDGE_MATERIALS_GLSL
 #define BRIDGE_MATERIALS_GLSL
 #include "half_vector.glsl"
 #include "ggx.glsl"
+#include "blinn_phong.glsl"
+#include "cavity.glsl"
 
 const uint REFLECTANCE_TABLE = 0u;
 const uint REFLECTANCE_GGX = 1u;
+const uint REFLECTANCE_BLINN_PHONG = 2u;
+const uint REFLECTANCE_VMF = 3u;
+const uint REFLECTANCE_TURNED = 4u;
 
 // Table resolution (MERL) and importance table layout (src/reflectance/importance.rs).
 const vec3 TABLE_SIZE = vec3(180.0, 90.0, 90.0); // phi_d, theta_d, theta_h
@@ -15,13 +21,18 @@ const uint IMPORTANCE_ROWS = 64u;
 const uint IMPORTANCE_COLUMNS = 16u;
 const vec2 DENSITY_SIZE = vec2(16.0, 64.0); // cos(phi_h), warped theta_h
 // Least distance in texels from the edge of a table in the atlas: the outermost bins' centres, and more than the rounding of a
-// coordinate can miss them by in an atlas of 8 x 8 tables. The neighbour's values may be a million times higher.
+// coordinate can miss them by in an atlas of 5 x 5 tables; larger ones have a wider border. The neighbour's values may be a million times higher.
 const float TABLE_BORDER = 0.5 + 1.0 / 8192.0;
 
+// By kind:           table               GGX              Blinn-Phong         vMF                turned tables
+//   kind.yz          place in the atlas                                       first lobe, lobes  first table, tables
+//   f0               -                   F0; alpha        specular; exponent  1                  x: tables per radian
+//   albedo           w: scale            albedo           albedo              0                  w: scale
+// A lobe is a record of its own: mean direction and concentration in f0, its density at the centre in albedo.x.
 struct MaterialRecord {
-    uvec4 kind;  // reflectance kind, table's place in the atlas (theta_d, theta_h), unused
-    vec4 f0;     // rgb; alpha
-    vec4 albedo; // rgb; scale of the table's values
+    uvec4 kind;  // x: kind of reflectance
+    vec4 f0;
+    vec4 albedo;
 };
 
 layout(set = 1, binding = 0, std430) readonly buffer Materials {
@@ -37,27 +48,88 @@ struct Material {
     ivec2 cell;      // first texel of its importance cells for this view angle
     vec2 density;    // first texel of its density tile
     vec2 table;      // first texel of its table in y, z
+    vec2 turn;       // cosine and sine of the angle from the tangent frame's x axis to the local one
 };
 
-Material material_load(uint id, float cos_o) {
+Material material_load(uint id, float cos_o, vec2 turn) {
     Material m;
     m.record = materials[id];
     uint angle = min(uint(acos_positive(clamp(cos_o, 0.0, 1.0)) * (2.0 * INV_PI * float(IMPORTANCE_ANGLES))), IMPORTANCE_ANGLES - 1u);
     m.cell = ivec2(angle * IMPORTANCE_COLUMNS, id * IMPORTANCE_ROWS);
     m.density = vec2(angle, id) * DENSITY_SIZE;
     m.table = vec2(m.record.kind.yz) * TABLE_SIZE.yz;
+    m.turn = turn;
     return m;
 }
 
-// BRDF in 1/sr for directions above the horizon, h their half vector.
-vec3 material_evaluate(Material m, vec3 wi, vec3 wo, vec3 h) {
-    if (m.record.kind.x == REFLECTANCE_GGX) {
-        return ggx_evaluate(m.record.f0.rgb, m.record.albedo.rgb, m.record.f0.a, wi, wo, h);
-    }
+// For surfaces without tangents: the local frame stands for the tangent frame.
+Material material_load(uint id, float cos_o) {
+    return material_load(id, cos_o, vec2(1.0, 0.0));
+}
+
+// A table, or tables over the half vector's azimuth (src/reflectance/turned.rs) of which two neighbours are mixed; h is the half
+// vector of directions above the horizon, t the same in the tangent frame.
+vec3 material_tables(Material m, vec3 wi, vec3 wo, vec3 h, vec3 t) {
+    bool turned = m.record.kind.x == REFLECTANCE_TURNED;
+    vec2 size = vec2(textureSize(reflectance_tables, 0).yz);
+    vec2 border = max(vec2(TABLE_BORDER), 0.5 + size * (1.0 / 4194304.0));
     vec2 c = vec2(acos_positive(clamp(dot(wo, h), 0.0, 1.0)) * (2.0 * INV_PI), half_warp(h)) * TABLE_SIZE.yz;
-    c = clamp(c, vec2(TABLE_BORDER), TABLE_SIZE.yz - TABLE_BORDER) + m.table;
-    vec3 at = vec3(difference_turn(wi, h), c / vec2(textureSize(reflectance_tables, 0).yz));
-    return textureLod(reflectance_tables, at, 0.0).rgb * m.record.albedo.a;
+    c = clamp(c, border, TABLE_SIZE.yz - border);
+    float phi_d = difference_turn(wi, h);
+
+    // In floating point, as the reference driver divides integers one by one: numbers are small enough to be exact.
+    float count = float(m.record.kind.z);
+    float columns = round(size.x / TABLE_SIZE.y);
+    float at = turned ? atan_full(t.y, t.x) * m.record.f0.x : 0.0;
+    float node = floor(at);
+    float weight = at - node;
+    vec2 table = m.table;
+    vec3 sum = vec3(0.0);
+    for (uint i = 0u; i < 2u; ++i) {
+        if (turned) {
+            float slot = float(m.record.kind.y) + node - count * floor((node + 0.5) / count);
+            float row = floor((slot + 0.5) / columns);
+            table = vec2(slot - row * columns, row) * TABLE_SIZE.yz;
+        }
+        sum += textureLod(reflectance_tables, vec3(phi_d, (c + table) / size), 0.0).rgb * (i == 0u ? 1.0 - weight : weight);
+        if (!turned) {
+            break;
+        }
+        node += 1.0;
+    }
+    return sum * m.record.albedo.a;
+}
+
+// Density of normals in 1/sr of the two kinds with V-cavity masking: cosine-power (src/reflectance/blinn_phong.rs) and a mixture
+// of vMF lobes (src/reflectance/vmf.rs).
+float material_distribution(Material m, vec3 h, vec3 t) {
+    bool vmf = m.record.kind.x == REFLECTANCE_VMF;
+    uint lobes = vmf ? m.record.kind.z : 1u;
+    float sum = 0.0;
+    for (uint i = 0u; i < lobes; ++i) {
+        // Without lobes of its own, a record stands in, unused.
+        MaterialRecord lobe = materials[vmf ? m.record.kind.y + i : 0u];
+        vec3 d = t - lobe.f0.xyz;
+        float exponent = vmf ? -0.5 * lobe.f0.w * dot(d, d) : blinn_phong_exponent(m.record.f0.a, h);
+        sum += (vmf ? lobe.albedo.x : blinn_phong_peak(m.record.f0.a)) * exp(exponent);
+    }
+    return sum;
+}
+
+// BRDF in 1/sr for directions above the horizon, h their half vector. Kinds share what they can and there is no early return:
+// the reference driver runs all branches.
+vec3 material_evaluate(Material m, vec3 wi, vec3 wo, vec3 h) {
+    uint kind = m.record.kind.x;
+    vec3 t = vec3(m.turn.x * h.x - m.turn.y * h.y, m.turn.y * h.x + m.turn.x * h.y, h.z);
+    vec3 value;
+    if (kind == REFLECTANCE_TABLE || kind == REFLECTANCE_TURNED) {
+        value = material_tables(m, wi, wo, h, t);
+    } else if (kind == REFLECTANCE_GGX) {
+        value = ggx_evaluate(m.record.f0.rgb, m.record.albedo.rgb, m.record.f0.a, wi, wo, h);
+    } else {
+        value = m.record.f0.rgb * (material_distribution(m, h, t) * cavity_masking(wi, wo, h)) + m.record.albedo.rgb * INV_PI;
+    }
+    return value;
 }
 
 // A half vector, and its density in 1/sr of h, from two 32-bit numbers (Bagher 2011, section 3.3).

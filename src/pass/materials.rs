@@ -11,9 +11,10 @@ use crate::gpu::sampler::Samplers;
 use crate::gpu::upload::{BufferUpload, ImageUpload};
 use crate::reflectance::importance::{COLUMNS, DENSITY_COLUMNS, DENSITY_ROWS, ImportanceTable, ROWS, VIEW_ANGLES};
 use crate::reflectance::merl::{PHI_DIFF, THETA_DIFF, THETA_HALF};
-use crate::reflectance::{MerlTable, Model};
+use crate::reflectance::{Lobe, MerlTable, Model};
 use ash::vk;
 use bytemuck::{Pod, Zeroable};
+use glam::DVec3;
 use half::f16;
 use std::sync::Arc;
 
@@ -65,54 +66,101 @@ fn place(i: usize, count: usize, limit: u32) -> Option<([u32; 2], [u32; 2])> {
     (columns <= per_side).then(|| ([(i % columns) as u32, (i / columns) as u32], [columns as u32, rows as u32]))
 }
 
+/// The tables of all models, each stored once however many materials share it.
+struct Tables<'a> {
+    /// With the factor under which it is packed.
+    all: Vec<(&'a MerlTable, f32)>,
+    /// Of each model: its first table.
+    slots: Vec<usize>,
+}
+
+impl<'a> Tables<'a> {
+    fn of(models: &'a [Model]) -> Self {
+        let mut tables = Self { all: Vec::new(), slots: Vec::new() };
+        let mut known: Vec<(*const u8, usize)> = Vec::new();
+        for model in models {
+            let (key, nodes): (*const u8, Vec<&MerlTable>) = match model {
+                Model::Table(table) => (Arc::as_ptr(table).cast(), vec![table]),
+                Model::Turned(turned) => (Arc::as_ptr(turned).cast(), turned.nodes().iter().map(Arc::as_ref).collect()),
+                Model::Ggx(_) | Model::BlinnPhong(_) | Model::Vmf(_) => (std::ptr::null(), Vec::new()),
+            };
+            let found = known.iter().find(|k| k.0 == key && !nodes.is_empty()).map(|k| k.1);
+            let slot = found.unwrap_or_else(|| {
+                known.push((key, tables.all.len()));
+                // Neighbours are interpolated, so that the tables of one material have one factor.
+                let scale = nodes.iter().map(|t| t.packing_scale()).fold(1.0, f32::max);
+                tables.all.extend(nodes.iter().map(|&t| (t, scale)));
+                tables.all.len() - nodes.len()
+            });
+            tables.slots.push(slot);
+        }
+        tables
+    }
+}
+
+/// The records of `models`, and behind them those of vMF lobes; `columns` is the width of the atlas in tables.
+fn records(models: &[Model], tables: &Tables<'_>, columns: u32) -> Vec<Record> {
+    let with = |v: DVec3, w: f64| v.extend(w).as_vec4().to_array();
+    let mut lobes = Vec::new();
+    let mut records: Vec<_> = models
+        .iter()
+        .zip(&tables.slots)
+        .map(|(model, &slot)| {
+            let scale = tables.all.get(slot).map_or(1.0, |t| t.1);
+            let slot = slot as u32;
+            match model {
+                Model::Table(_) => {
+                    let kind = [0, slot % columns, slot / columns, 0];
+                    Record { kind, f0: [0.0; 4], albedo: [0.0, 0.0, 0.0, scale] }
+                }
+                Model::Ggx(g) => Record { kind: [1, 0, 0, 0], f0: with(g.f0, g.alpha), albedo: with(g.albedo, 1.0) },
+                Model::BlinnPhong(b) => {
+                    Record { kind: [2, 0, 0, 0], f0: with(b.specular, b.exponent), albedo: with(b.albedo, 1.0) }
+                }
+                Model::Vmf(vmf) => {
+                    let first = models.len() + lobes.len();
+                    let lobe = |(l, peak): (&Lobe, &f64)| Record {
+                        kind: [0; 4],
+                        f0: with(l.mu, l.kappa),
+                        albedo: [*peak as f32, 0.0, 0.0, 0.0],
+                    };
+                    lobes.extend(vmf.lobes().iter().zip(vmf.peaks()).map(lobe));
+                    Record { kind: [3, first as u32, vmf.lobes().len() as u32, 0], f0: [1.0; 4], albedo: [0.0; 4] }
+                }
+                Model::Turned(turned) => {
+                    let kind = [4, slot, turned.nodes().len() as u32, 0];
+                    Record { kind, f0: [turned.nodes_per_radian() as f32, 0.0, 0.0, 0.0], albedo: [0.0, 0.0, 0.0, scale] }
+                }
+            }
+        })
+        .collect();
+    records.append(&mut lobes);
+    records
+}
+
 impl MaterialsUpload {
     pub fn new(build: &mut Build<'_>, models: &[Model]) -> Result<Self> {
         if models.is_empty() || models.len() > MAX_MATERIALS {
             return Err(Error::invalid("materials", format!("1 to {MAX_MATERIALS}"), models.len()));
         }
         for (i, model) in models.iter().enumerate() {
-            if let Model::Ggx(ggx) = model {
-                ggx.validate().map_err(|e| match e {
-                    Error::InvalidInput { field, expected, got } => {
-                        Error::invalid(format!("materials[{i}].{field}"), expected, got)
-                    }
-                    other => other,
-                })?;
-            }
+            let valid = match model {
+                Model::Ggx(ggx) => ggx.validate(),
+                Model::BlinnPhong(blinn_phong) => blinn_phong.validate(),
+                Model::Table(_) | Model::Turned(_) | Model::Vmf(_) => Ok(()),
+            };
+            valid.map_err(|e| match e {
+                Error::InvalidInput { field, expected, got } => Error::invalid(format!("materials[{i}].{field}"), expected, got),
+                other => other,
+            })?;
         }
-        // A table that several materials share is stored once.
-        let mut tables: Vec<&Arc<MerlTable>> = Vec::new();
-        let mut slots = Vec::new();
-        for model in models {
-            slots.push(if let Model::Table(table) = model {
-                let known = tables.iter().position(|t| Arc::ptr_eq(t, table));
-                known.unwrap_or_else(|| {
-                    tables.push(table);
-                    tables.len() - 1
-                })
-            } else {
-                0
-            });
-        }
+        let tables = Tables::of(models);
         let limit = build.cx.limits.max_image_dimension3_d;
-        let atlas = place(0, tables.len(), limit)
-            .ok_or_else(|| Error::invalid("materials", format!("tables that fit a 3-D image of side {limit}"), tables.len()))?
+        let atlas = place(0, tables.all.len(), limit)
+            .ok_or_else(|| Error::invalid("materials", format!("tables that fit a 3-D image of side {limit}"), tables.all.len()))?
             .1;
-        let packed: Vec<_> = tables.iter().map(|t| t.packed()).collect();
-        let records: Vec<_> = models
-            .iter()
-            .zip(&slots)
-            .map(|(model, &slot)| match model {
-                Model::Table(_) => {
-                    let at = place(slot, tables.len(), limit).map_or([0, 0], |p| p.0);
-                    Record { kind: [0, at[0], at[1], 0], f0: [0.0; 4], albedo: [0.0, 0.0, 0.0, packed[slot].0] }
-                }
-                Model::Ggx(g) => {
-                    let with = |v: glam::DVec3, w: f64| v.extend(w).as_vec4().to_array();
-                    Record { kind: [1, 0, 0, 0], f0: with(g.f0, g.alpha), albedo: with(g.albedo, 1.0) }
-                }
-            })
-            .collect();
+        let records = records(models, &tables, atlas[0]);
+        let packed: Vec<_> = tables.all.iter().map(|(table, scale)| table.packed_at(*scale)).collect();
         let importance: Vec<_> = models.iter().map(|m| ImportanceTable::build(m)).collect();
         let image = |name, format, extent| ImageDesc { name, format, extent, usage: vk::ImageUsageFlags::SAMPLED };
         let angles = VIEW_ANGLES as u32;
@@ -157,11 +205,11 @@ impl MaterialsUpload {
 }
 
 /// Tables (phi_d fastest, then theta_d, then theta_h) laid side by side in theta_d and theta_h.
-fn table_atlas(packed: &[(f32, Vec<u32>)], [columns, rows]: [u32; 2]) -> Vec<u32> {
+fn table_atlas(packed: &[Vec<u32>], [columns, rows]: [u32; 2]) -> Vec<u32> {
     let (columns, rows) = (columns as usize, rows as usize);
     let slice = THETA_DIFF * PHI_DIFF;
     let mut atlas = vec![0; columns * rows * slice * THETA_HALF];
-    for (i, (_, table)) in packed.iter().enumerate() {
+    for (i, table) in packed.iter().enumerate() {
         let (column, row) = (i % columns, i / columns);
         for (theta_h, texels) in table.chunks_exact(slice).enumerate() {
             let at = ((row * THETA_HALF + theta_h) * columns + column) * slice;

@@ -2,8 +2,9 @@
 //! of equal probability over the half vector. Twin of `glsl/include/reflectance/importance.glsl`.
 //!
 //! Local frame: z is the normal and the viewer is in the xz-plane, `wo = (sin, 0, cos)`. A half vector h is known by
-//! `t = 1 - cos(theta_h)` in [0, 1] and its azimuth in [-pi, pi], in which solid angle is `dt dphi`; reflectance is
-//! isotropic, so the azimuth's sign is a coin toss and the tables cover [0, pi].
+//! `t = 1 - cos(theta_h)` in [0, 1] and its azimuth in [-pi, pi], in which solid angle is `dt dphi`. The tables follow the
+//! reflectance's mean over turns about the normal, which is the reflectance itself if it is isotropic; so the azimuth's sign
+//! is a coin toss and they cover [0, pi].
 
 use crate::reflectance::{Reflectance, clamped};
 use crate::sampling::luminance;
@@ -210,7 +211,7 @@ impl FineGrid {
         let mut reflected: Vec<f64> = self
             .h
             .iter()
-            .map(|&h| light(h).map_or(0.0, |(wi, jacobian)| luminance(reflectance.evaluate(wi, wo)) * jacobian))
+            .map(|&h| light(h).map_or(0.0, |(wi, jacobian)| luminance(reflectance.mean_over_turns(wi, wo)) * jacobian))
             .collect();
         reflected.iter_mut().filter(|f| !(f.is_finite() && **f > 0.0)).for_each(|f| *f = 0.0);
         let integral = self.integral(&reflected);

@@ -2,7 +2,7 @@
 //! the half vector's polar angle, finer towards the peak, by the light's polar and azimuth angle about the half vector
 //! (Rusinkiewicz 1998). Twin of `glsl/include/reflectance/merl.glsl`.
 
-use crate::reflectance::{Reflectance, clamped, packing};
+use crate::reflectance::{MerlError, Reflectance, clamped, packing};
 use glam::{DVec2, DVec3};
 use std::f64::consts::{FRAC_PI_2, PI};
 
@@ -13,24 +13,12 @@ pub const THETA_DIFF: usize = 90;
 /// Bins of phi_diff over 0..pi; the other half of the circle is its mirror by reciprocity.
 pub const PHI_DIFF: usize = 180;
 
-const ENTRIES: usize = THETA_HALF * THETA_DIFF * PHI_DIFF;
+const ENTRIES: usize = THETA_HALF * SLICE;
+/// Entries of one theta_half.
+const SLICE: usize = THETA_DIFF * PHI_DIFF;
 const HEADER_BYTES: usize = 12;
 /// 1/sr over the stored number, per channel.
 const SCALE: [f64; 3] = [1.0 / 1500.0, 1.15 / 1500.0, 1.66 / 1500.0];
-
-/// What is wrong with a MERL `.binary` file.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("{field} at byte {offset}: expected {expected}, got {got}")]
-pub struct MerlError {
-    /// The part of the file: `dimensions`, `size` or a channel's entry.
-    pub field: String,
-    /// Where it begins, in bytes from the start.
-    pub offset: u64,
-    /// What would be right.
-    pub expected: String,
-    /// What was found.
-    pub got: String,
-}
 
 /// An isotropic table of 90 x 90 x 180 reflectances (theta_half, theta_diff, phi_diff), in 1/sr.
 #[derive(Clone, Debug, PartialEq)]
@@ -44,16 +32,35 @@ impl MerlTable {
     /// finite as `f32` become 0, the table's word for "no measurement". `f` is also asked for angles that put one direction
     /// below the horizon: what it says there is interpolated into the last bins above it.
     pub fn from_fn(mut f: impl FnMut(f64, f64, f64) -> DVec3) -> Self {
-        let mut values = Vec::with_capacity(ENTRIES);
-        for i in 0..THETA_HALF {
-            let theta_half = FRAC_PI_2 * ((i as f64 + 0.5) / THETA_HALF as f64).powi(2);
-            for j in 0..THETA_DIFF {
-                let theta_diff = FRAC_PI_2 * (j as f64 + 0.5) / THETA_DIFF as f64;
-                for k in 0..PHI_DIFF {
-                    let rgb = f(theta_half, theta_diff, PI * (k as f64 + 0.5) / PHI_DIFF as f64);
-                    values.push(rgb.to_array().map(|c| stored(c).unwrap_or(0.0)));
-                }
+        let mut values = vec![[0.0; 3]; ENTRIES];
+        values.chunks_exact_mut(SLICE).enumerate().for_each(|(i, slice)| fill(slice, i, &mut f));
+        Self { values }
+    }
+
+    /// [`Self::from_fn`] on all cores.
+    pub(super) fn from_fn_parallel(f: impl Fn(f64, f64, f64) -> DVec3 + Sync) -> Self {
+        let mut values = vec![[0.0; 3]; ENTRIES];
+        let threads = std::thread::available_parallelism().map_or(1, usize::from).min(THETA_HALF);
+        let mut shares: Vec<Vec<_>> = (0..threads).map(|_| Vec::new()).collect();
+        for (i, slice) in values.chunks_exact_mut(SLICE).enumerate() {
+            if let Some(share) = shares.get_mut(i % threads) {
+                share.push((i, slice));
             }
+        }
+        std::thread::scope(|scope| {
+            for share in shares {
+                scope.spawn(|| share.into_iter().for_each(|(i, slice)| fill(slice, i, &f)));
+            }
+        });
+        Self { values }
+    }
+
+    /// The mean of tables; black for none.
+    pub(super) fn mean(tables: &[impl AsRef<Self>]) -> Self {
+        let mut values = vec![[0.0; 3]; ENTRIES];
+        for table in tables {
+            let pairs = values.as_flattened_mut().iter_mut().zip(table.as_ref().values.as_flattened());
+            pairs.for_each(|(sum, value)| *sum += value / tables.len() as f32);
         }
         Self { values }
     }
@@ -119,12 +126,31 @@ impl MerlTable {
     /// entry's value is the factor times what [`packing::decode`] returns. The factor is 1 unless an entry is above
     /// [`packing::MAX`], then the least power of two that brings all below.
     pub fn packed(&self) -> (f32, Vec<u32>) {
+        let scale = self.packing_scale();
+        (scale, self.packed_at(scale))
+    }
+
+    /// The factor of [`Self::packed`].
+    pub fn packing_scale(&self) -> f32 {
         let largest = self.values.iter().flatten().fold(0.0, |a: f32, &c| a.max(c));
         let mut scale = 1.0;
         while f64::from(largest) / scale > packing::MAX {
             scale *= 2.0;
         }
-        (scale as f32, self.values.iter().map(|&v| packing::encode(vector(v) / scale)).collect())
+        scale as f32
+    }
+
+    /// The entries of [`Self::packed`] under a given factor above 0.
+    pub fn packed_at(&self, scale: f32) -> Vec<u32> {
+        self.values.iter().map(|&v| packing::encode(vector(v) / f64::from(scale))).collect()
+    }
+
+    /// The table that [`Self::packed`] entries stand for: what the GPU reads.
+    pub fn unpacked(scale: f32, entries: &[u32]) -> Self {
+        let decoded = entries.iter().map(|&e| (packing::decode(e) * f64::from(scale)).as_vec3().to_array());
+        let mut values: Vec<_> = decoded.take(ENTRIES).collect();
+        values.resize(ENTRIES, [0.0; 3]);
+        Self { values }
     }
 
     /// The value of a bin.
@@ -187,6 +213,18 @@ impl Angles {
         let along = DVec3::new(h_sin, 0.0, h_cos) * d_cos;
         let across = DVec3::new(h_cos * p_cos, p_sin, -h_sin * p_cos) * d_sin;
         (along + across, along - across)
+    }
+}
+
+/// Tabulates one theta_half.
+fn fill(slice: &mut [[f32; 3]], i: usize, mut f: impl FnMut(f64, f64, f64) -> DVec3) {
+    let theta_half = FRAC_PI_2 * ((i as f64 + 0.5) / THETA_HALF as f64).powi(2);
+    for (j, row) in slice.chunks_exact_mut(PHI_DIFF).enumerate() {
+        let theta_diff = FRAC_PI_2 * (j as f64 + 0.5) / THETA_DIFF as f64;
+        for (k, entry) in row.iter_mut().enumerate() {
+            let rgb = f(theta_half, theta_diff, PI * (k as f64 + 0.5) / PHI_DIFF as f64);
+            *entry = rgb.to_array().map(|c| stored(c).unwrap_or(0.0));
+        }
     }
 }
 

@@ -1,40 +1,120 @@
-//! Reflectance data and models, evaluated in f64: the twins of `glsl/include/reflectance`.
+//! Reflectance data and models, evaluated in f64: the twins of `glsl/include`.
+//!
+//! **Frames.** z is the normal. An isotropic reflectance does not tell how the frame is turned about it; one that is not
+//! ([`Reflectance::isotropic`]) wants directions in the surface's tangent frame.
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
+use std::sync::Arc;
 
+pub mod analysis;
+pub mod bake;
+pub mod blinn_phong;
+mod cavity;
 pub mod ggx;
 pub mod importance;
 pub mod merl;
 pub mod packing;
+pub mod rgl;
+pub mod sgd;
+#[cfg(feature = "offline")]
+pub mod sgd_table;
 pub mod stand_in;
+pub mod turned;
+pub mod vmf;
 
+pub use blinn_phong::BlinnPhong;
 pub use ggx::Ggx;
 pub use importance::ImportanceTable;
-pub use merl::{MerlError, MerlTable};
+pub use merl::MerlTable;
+pub use rgl::Rgl;
+pub use sgd::Sgd;
+pub use turned::TurnedTables;
+pub use vmf::{Lobe, Vmf};
+
+/// What is wrong with a binary reflectance file.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{field} at byte {offset}: expected {expected}, got {got}")]
+pub struct DataError {
+    /// The part of the file.
+    pub field: String,
+    /// Where it begins, in bytes from the start.
+    pub offset: u64,
+    /// What would be right.
+    pub expected: String,
+    /// What was found.
+    pub got: String,
+}
+
+pub use DataError as MerlError;
+
+impl DataError {
+    /// Shorthand.
+    fn new(field: impl Into<String>, offset: usize, expected: impl Into<String>, got: impl ToString) -> Self {
+        Self { field: field.into(), offset: offset as u64, expected: expected.into(), got: got.to_string() }
+    }
+}
 
 /// A surface's reflectance in its local frame (z is the normal).
 pub trait Reflectance: Send + Sync {
     /// The BRDF in 1/sr without the cosine, per Rec.709 channel; zero if either direction is at or below the horizon.
     /// `wi` points to the light, `wo` to the viewer; both are unit vectors.
     fn evaluate(&self, wi: DVec3, wo: DVec3) -> DVec3;
+
+    /// Whether turning both directions about the normal changes nothing.
+    fn isotropic(&self) -> bool {
+        true
+    }
+
+    /// [`Self::evaluate`] averaged over all turns of both directions about the normal.
+    fn mean_over_turns(&self, wi: DVec3, wo: DVec3) -> DVec3 {
+        self.evaluate(wi, wo)
+    }
 }
 
 /// The reflectances that the renderer shades.
 #[derive(Clone, Debug)]
 pub enum Model {
     /// A measured (or measured-like) isotropic table at MERL resolution.
-    Table(std::sync::Arc<MerlTable>),
+    Table(Arc<MerlTable>),
+    /// Tables at MERL resolution over the half vector's azimuth.
+    Turned(Arc<TurnedTables>),
     /// Analytic microfacets over a diffuse base.
     Ggx(Ggx),
+    /// A cosine-power distribution of normals over a diffuse base.
+    BlinnPhong(BlinnPhong),
+    /// A mixture of von Mises-Fisher lobes of normals.
+    Vmf(Arc<Vmf>),
+}
+
+impl Model {
+    fn inner(&self) -> &dyn Reflectance {
+        match self {
+            Self::Table(table) => table.as_ref(),
+            Self::Turned(tables) => tables.as_ref(),
+            Self::Ggx(ggx) => ggx,
+            Self::BlinnPhong(blinn_phong) => blinn_phong,
+            Self::Vmf(vmf) => vmf.as_ref(),
+        }
+    }
 }
 
 impl Reflectance for Model {
     fn evaluate(&self, wi: DVec3, wo: DVec3) -> DVec3 {
-        match self {
-            Self::Table(table) => table.evaluate(wi, wo),
-            Self::Ggx(ggx) => ggx.evaluate(wi, wo),
-        }
+        self.inner().evaluate(wi, wo)
     }
+
+    fn isotropic(&self) -> bool {
+        self.inner().isotropic()
+    }
+
+    fn mean_over_turns(&self, wi: DVec3, wo: DVec3) -> DVec3 {
+        self.inner().mean_over_turns(wi, wo)
+    }
+}
+
+/// `v` turned about the normal by the angle whose cosine and sine `turn` holds.
+pub fn turned(turn: DVec2, v: DVec3) -> DVec3 {
+    DVec3::new(turn.x * v.x - turn.y * v.y, turn.y * v.x + turn.x * v.y, v.z)
 }
 
 /// The neighbours and the weight of the second at `unit` of an axis of `bins` over [0, 1]: linear between bin centres.

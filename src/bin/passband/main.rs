@@ -2,6 +2,7 @@
 
 mod compare;
 mod info;
+mod material;
 mod render;
 mod scenes;
 
@@ -22,6 +23,7 @@ enum Command {
     Render(Box<render::Args>),
     Compare(compare::Args),
     Info(info::Args),
+    Material(material::Args),
     Scenes(scenes::Args),
 }
 
@@ -34,6 +36,7 @@ fn main() -> ExitCode {
         Command::Render(args) => render::run(args),
         Command::Compare(args) => compare::run(args),
         Command::Info(args) => info::run(args),
+        Command::Material(args) => material::run(args),
         Command::Scenes(args) => scenes::run(args),
     };
     // The one place where errors become exit codes: 2 for what was asked, 3 for the device.

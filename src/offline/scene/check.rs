@@ -3,8 +3,12 @@
 
 use crate::offline::builtin;
 use crate::offline::error::Result;
-use crate::offline::scene::format::{Camera, Environment, Ggx, Material, Object, Reflectance, SceneFile, Triple, Vector};
+use crate::offline::scene::format::{
+    Camera, Environment, Ggx, Material, Object, Reflectance, SceneFile, Sgd, Triple, Vector, Vmf,
+};
 use crate::offline::scene::source::{Source, Span};
+use crate::reflectance::sgd::PARAMETERS;
+use crate::reflectance::vmf::MAX_LOBES;
 use glam::{DMat4, DVec3};
 use std::path::Path;
 use toml::Spanned;
@@ -131,7 +135,51 @@ impl Check<'_> {
         self.one(&reflectance.span(), &choices)?;
         self.each(&r.merl, |c, v| c.text(v))?;
         self.each(&r.ggx, |c, v| c.ggx(v.get_ref()))?;
-        self.other_reflectances(r)
+        self.each(&r.sgd, Self::sgd)?;
+        self.each(&r.rgl, |c, v| c.extension(v, &["bsdf"]).map(drop))?;
+        self.each(&r.blinn_phong, |c, v| {
+            c.number(&v.get_ref().exponent, "a number >= 0", |v| v >= 0.0)?;
+            c.fraction(&v.get_ref().specular)?;
+            c.fraction(&v.get_ref().albedo)
+        })?;
+        self.each(&r.vmf, Self::vmf)
+    }
+
+    /// A row of a table, or every parameter.
+    fn sgd(&mut self, sgd: &Spanned<Sgd>) -> Result<()> {
+        let keys = sgd.get_ref();
+        let mut given = PARAMETERS.into_iter().zip(keys.parameters());
+        if let (Some(table), Some(name)) = (&keys.table, &keys.name) {
+            self.extension(table, &["csv"])?;
+            self.text(name)?;
+            return match given.find_map(|(_, key)| span(key)) {
+                Some(at) => Err(self.source.error(&at, "no parameters beside table", "both")),
+                None => Ok(()),
+            };
+        }
+        let lonely = [("name", &keys.table), ("table", &keys.name)];
+        for (missing, key) in lonely {
+            self.each(key, |c, v| c.require(false, &v.span(), &format!("a {missing} beside it"), "none"))?;
+        }
+        match given.find(|(_, key)| key.is_none()) {
+            Some((missing, _)) => {
+                let expected = format!("table and name, or {}", PARAMETERS.join(", "));
+                Err(self.source.error(&sgd.span(), expected, format!("no {missing}")))
+            }
+            None => Ok(()),
+        }
+    }
+
+    fn vmf(&mut self, lobes: &Spanned<Vec<Vmf>>) -> Result<()> {
+        let count = lobes.get_ref().len();
+        let expected = format!("1 to {MAX_LOBES} lobes");
+        self.require((1..=MAX_LOBES).contains(&count), &lobes.span(), &expected, count)?;
+        for lobe in lobes.get_ref() {
+            self.direction(&lobe.mu)?;
+            self.number(&lobe.kappa, "a number >= 0", |v| v >= 0.0)?;
+            self.number(&lobe.weight, "a number >= 0", |v| v >= 0.0)?;
+        }
+        Ok(())
     }
 
     fn ggx(&mut self, ggx: &Ggx) -> Result<()> {

@@ -111,8 +111,40 @@ pub(super) struct Reflectance {
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Sgd {
-    pub table: Spanned<String>,
-    pub name: Spanned<String>,
+    pub table: Key<String>,
+    pub name: Key<String>,
+    pub rhod: Key<Triple>,
+    pub rhos: Key<Triple>,
+    pub alpha: Key<Triple>,
+    pub p: Key<Triple>,
+    #[serde(rename = "F0")]
+    pub f0: Key<Triple>,
+    #[serde(rename = "F1")]
+    pub f1: Key<Triple>,
+    pub kap: Key<Triple>,
+    pub lambda: Key<Triple>,
+    pub c: Key<Triple>,
+    pub k: Key<Triple>,
+    pub theta0: Key<Triple>,
+}
+
+impl Sgd {
+    /// The inline parameters in the order of [`crate::reflectance::sgd::PARAMETERS`].
+    pub fn parameters(&self) -> [&Key<Triple>; 11] {
+        [
+            &self.rhod,
+            &self.rhos,
+            &self.alpha,
+            &self.p,
+            &self.f0,
+            &self.f1,
+            &self.kap,
+            &self.lambda,
+            &self.c,
+            &self.k,
+            &self.theta0,
+        ]
+    }
 }
 
 #[derive(Debug, Deserialize)]

@@ -2,7 +2,7 @@
 
 use crate::offline::error::Result;
 use crate::offline::scene::check::{Check, span};
-use crate::offline::scene::format::{Animation, Material, Reflectance, Settings, Vector};
+use crate::offline::scene::format::{Animation, Material, Settings, Vector};
 use crate::offline::scene::source::Span;
 use glam::DVec3;
 use toml::Spanned;
@@ -35,30 +35,6 @@ impl Check<'_> {
             }
         }
         self.later.extend(span(&m.tiling));
-        Ok(())
-    }
-
-    pub(super) fn other_reflectances(&mut self, r: &Reflectance) -> Result<()> {
-        self.each(&r.sgd, |c, v| {
-            c.extension(&v.get_ref().table, &["csv"])?;
-            c.text(&v.get_ref().name)
-        })?;
-        self.each(&r.rgl, |c, v| c.extension(v, &["bsdf"]).map(drop))?;
-        self.each(&r.blinn_phong, |c, v| {
-            c.number(&v.get_ref().exponent, "a number >= 0", |v| v >= 0.0)?;
-            c.fraction(&v.get_ref().specular)?;
-            c.fraction(&v.get_ref().albedo)
-        })?;
-        self.each(&r.vmf, |c, lobes| {
-            c.require(!lobes.get_ref().is_empty(), &lobes.span(), "at least one lobe", "none")?;
-            for lobe in lobes.get_ref() {
-                c.direction(&lobe.mu)?;
-                c.number(&lobe.kappa, "a number >= 0", |v| v >= 0.0)?;
-                c.number(&lobe.weight, "a number >= 0", |v| v >= 0.0)?;
-            }
-            Ok(())
-        })?;
-        self.later.extend([span(&r.sgd), span(&r.rgl), span(&r.blinn_phong), span(&r.vmf)].into_iter().flatten());
         Ok(())
     }
 

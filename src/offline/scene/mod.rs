@@ -14,6 +14,8 @@ mod overrides;
 mod resolve;
 mod source;
 
+pub use materials::{read_merl, read_rgl, read_sgd};
+
 /// Name and text of the scenes that need no other file.
 const BUILTINS: [(&str, &str); 5] = [
     ("trio", include_str!("../../../scenes/trio.toml")),

@@ -1,0 +1,118 @@
+//! `passband material`: what a reflectance does, in numbers and as a plot.
+
+use comfy_table::{Table, presets};
+use passband::offline::error::{Error, Result};
+use passband::offline::scene::{read_merl, read_rgl, read_sgd};
+use passband::reflectance::analysis::{HIGHLIGHT, albedo, highlight, reciprocity_error};
+use passband::reflectance::bake::{self, BakeError};
+use passband::reflectance::{MerlTable, Reflectance, stand_in};
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+#[path = "material_plot.rs"]
+mod plot;
+
+/// View angles at which the energy is reported, in degrees.
+const ANGLES: [f64; 7] = [0.0, 15.0, 30.0, 45.0, 60.0, 75.0, 85.0];
+/// Pairs at which what is baked is compared with what it was baked of.
+const PAIRS: u32 = 50_000;
+
+/// Reports a reflectance's energy, reciprocity and highlight, and plots its lobes and slices
+#[derive(clap::Args)]
+pub struct Args {
+    /// A MERL table (.binary), an RGL file (.bsdf), a row of an SGD table (TABLE.csv:NAME) or a built-in's name
+    #[arg(value_name = "FILE|NAME")]
+    material: String,
+    /// Plot to write (.png)
+    #[arg(short, long)]
+    output: Option<PathBuf>,
+}
+
+/// A reflectance to look at.
+struct Subject {
+    title: String,
+    reflectance: Box<dyn Reflectance>,
+    /// What the GPU shades instead, and how far that is off.
+    baked: BakeError,
+}
+
+/// Runs the subcommand.
+pub fn run(args: &Args) -> Result<ExitCode> {
+    if let Some(output) = &args.output
+        && output.extension().is_none_or(|e| !e.eq_ignore_ascii_case("png"))
+    {
+        return Err(Error::argument("--output", "a name that ends in .png", output.display()));
+    }
+    let subject = load(&args.material)?;
+    report(&subject);
+    if let Some(output) = &args.output {
+        plot::write(output, &subject.title, subject.reflectance.as_ref())?;
+        println!("\nplot: {}", output.display());
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+fn load(material: &str) -> Result<Subject> {
+    if let Some(table) = stand_in::table(material) {
+        return Ok(measured(format!("{material} (built-in, synthetic)"), table));
+    }
+    // The last colon, as a path may hold one too.
+    if let Some((table, name)) = material.rsplit_once(':').filter(|(table, _)| table.to_lowercase().ends_with(".csv")) {
+        let sgd = read_sgd(Path::new(table), name)?;
+        let baked = bake::error(&sgd, &packed(&sgd.bake()), PAIRS);
+        return Ok(Subject { title: format!("{name} (SGD)"), reflectance: Box::new(sgd), baked });
+    }
+    let path = Path::new(material);
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    let extension = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
+    match extension.as_str() {
+        "binary" => Ok(measured(format!("{stem} (MERL)"), read_merl(path)?)),
+        "bsdf" => {
+            let rgl = read_rgl(path)?;
+            let (kind, baked) = if rgl.isotropic() {
+                ("isotropic", bake::error(&rgl, &packed(&rgl.bake()), PAIRS))
+            } else {
+                ("anisotropic", bake::error(&rgl, &rgl.bake_turned()?, PAIRS))
+            };
+            Ok(Subject { title: format!("{stem} (RGL, {kind})"), reflectance: Box::new(rgl), baked })
+        }
+        _ => {
+            let expected = format!("FILE.binary, FILE.bsdf, TABLE.csv:NAME or one of {}", stand_in::names().join(", "));
+            Err(Error::argument("material", expected, format!("`{material}`")))
+        }
+    }
+}
+
+fn measured(title: String, table: MerlTable) -> Subject {
+    let baked = bake::error(&table, &packed(&table), PAIRS);
+    Subject { title, reflectance: Box::new(table), baked }
+}
+
+/// The table as the GPU holds it.
+fn packed(table: &MerlTable) -> MerlTable {
+    let (scale, entries) = table.packed();
+    MerlTable::unpacked(scale, &entries)
+}
+
+fn report(subject: &Subject) {
+    let reflectance = subject.reflectance.as_ref();
+    println!("{}\n\nreflected share of light, over the view angle:", subject.title);
+    let mut table = Table::new();
+    table.load_style(presets::NOTHING).set_header(["degrees", "red", "green", "blue"]);
+    for degrees in ANGLES {
+        let rgb = albedo(reflectance, degrees).to_array().map(|c| format!("{c:.4}"));
+        table.add_row([format!("{degrees}")].into_iter().chain(rgb));
+    }
+    println!("{table}\n");
+    let found = highlight(reflectance);
+    let width = found.half_width.map_or("none".into(), |w| format!("{w:.2} degrees"));
+    let bake = subject.baked;
+    let mut table = Table::new();
+    table.load_style(presets::NOTHING);
+    table.add_row(["largest reciprocity error".into(), format!("{:.2e}", reciprocity_error(reflectance))]);
+    table.add_row([format!("peak at {HIGHLIGHT} degrees"), format!("{:.4} 1/sr, {:.2} degrees off", found.peak, found.at)]);
+    table.add_row(["half-width at half maximum".into(), width]);
+    let error = format!("rms {:.2e}, median {:.2e}, 99 % {:.2e}", bake.rms, bake.median, bake.p99);
+    table.add_row(["table on the GPU, relative error".into(), error]);
+    println!("{table}");
+}
