@@ -139,7 +139,7 @@ vec4 material_sample(Material m, uvec2 u) {
     umulExtended(u.y << 1, IMPORTANCE_COLUMNS, column, column_fraction);
     vec4 cell = texelFetch(importance_cells, m.cell + ivec2(column, row), 0);
     vec2 size = cell.yw - cell.xz;
-    vec2 at = cell.xz + size * (vec2(row_fraction >> 8, column_fraction >> 8) * (1.0 / 16777216.0));
+    vec2 at = cell.xz + size * (vec2(ivec2(row_fraction >> 8, column_fraction >> 8)) * (1.0 / 16777216.0));
     float s = sqrt(at.x * (2.0 - at.x));
     vec2 phi = cos_sin((u.y & 0x80000000u) == 0u ? at.y : -at.y);
     return vec4(s * phi, 1.0 - at.x, 1.0 / (float(2u * IMPORTANCE_ROWS * IMPORTANCE_COLUMNS) * size.x * size.y));

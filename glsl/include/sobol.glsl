@@ -46,7 +46,7 @@ uvec2 random_point(uint i, uint seed) {
 }
 
 float to_unit(uint u) {
-    return float(u >> 8) * (1.0 / 16777216.0);
+    return float(int(u >> 8)) * (1.0 / 16777216.0); // signed conversions are the cheap ones
 }
 
 #endif

@@ -14,18 +14,21 @@ use ash::vk;
 /// Pass, label and set-up time name.
 pub const NAME: &str = "environment";
 
+/// Width of the alias table's image; its number of slots is a power of two, at least 16384.
+const SLOTS_A_ROW: u32 = 1024;
+
 /// What the shaders read (`glsl/include/environment.glsl`).
 pub(crate) struct EnvironmentImages {
     /// RGBA32F: radiance; density over uv.
     pub map: Image,
-    /// RG32UI: alias entries of every row's texels, and the rows' own entries.
-    pub entries: Image,
+    /// RG32UI: alias alias of every row's texels, and the rows' own alias.
+    pub alias: Image,
 }
 
 /// Created and filled, not yet recorded.
 pub(crate) struct EnvironmentUpload {
     map: ImageUpload,
-    entries: ImageUpload,
+    alias: ImageUpload,
 }
 
 impl EnvironmentUpload {
@@ -38,7 +41,7 @@ impl EnvironmentUpload {
         let importance = EnvironmentImportance::build(map)?;
         let radiance: Vec<[f32; 4]> =
             map.texels().iter().zip(importance.density_texels()).map(|(&[r, g, b], density)| [r, g, b, density]).collect();
-        let (extent, entries) = importance.entries();
+        let slots = importance.alias().packed();
         let desc = |name, format, [width, height]: [u32; 2]| ImageDesc {
             name,
             format,
@@ -46,15 +49,16 @@ impl EnvironmentUpload {
             usage: vk::ImageUsageFlags::SAMPLED,
         };
         let radiance_desc = desc("environment", vk::Format::R32G32B32A32_SFLOAT, [map.width(), map.height()]);
-        let entries_desc = desc("environment entries", vk::Format::R32_UINT, extent);
+        let alias_desc =
+            desc("environment alias", vk::Format::R32G32B32A32_UINT, [SLOTS_A_ROW, slots.len() as u32 / SLOTS_A_ROW]);
         Ok(Self {
             map: ImageUpload::new(build, radiance_desc, bytemuck::cast_slice(&radiance))?,
-            entries: ImageUpload::new(build, entries_desc, bytemuck::cast_slice(&entries))?,
+            alias: ImageUpload::new(build, alias_desc, bytemuck::cast_slice(&slots))?,
         })
     }
 
     pub fn record(self, rec: &mut Recorder<'_>, bag: &mut Retired) -> EnvironmentImages {
-        EnvironmentImages { map: self.map.record(rec, bag), entries: self.entries.record(rec, bag) }
+        EnvironmentImages { map: self.map.record(rec, bag), alias: self.alias.record(rec, bag) }
     }
 }
 
@@ -62,11 +66,11 @@ impl EnvironmentImages {
     /// Declares both images sampled by the pass that is open.
     pub fn sampled(&self, rec: &mut Recorder<'_>) {
         rec.image(&self.map, Access::COMPUTE_SAMPLED);
-        rec.image(&self.entries, Access::COMPUTE_SAMPLED);
+        rec.image(&self.alias, Access::COMPUTE_SAMPLED);
     }
 
     pub fn retire(self, states: &mut States, bag: &mut Retired) {
-        for image in [self.map, self.entries] {
+        for image in [self.map, self.alias] {
             states.forget(image.handle);
             image.retire(bag);
         }

@@ -56,7 +56,7 @@ impl Probe {
         let resources = [
             Resource::Uniform(io.frame),
             Resource::Sampled(&io.environment.map, io.samplers.linear),
-            Resource::Sampled(&io.environment.entries, io.samplers.nearest),
+            Resource::Sampled(&io.environment.alias, io.samplers.nearest),
             Resource::Buffer(io.input),
             Resource::Buffer(io.output),
         ];

@@ -51,7 +51,7 @@ impl Resolve {
         let resources = [
             Resource::Uniform(io.frame),
             Resource::Sampled(&io.environment.map, io.samplers.linear),
-            Resource::Sampled(&io.environment.entries, io.samplers.nearest),
+            Resource::Sampled(&io.environment.alias, io.samplers.nearest),
             Resource::Sampled(io.radiance, io.samplers.nearest),
             Resource::Storage(io.resolved.view),
         ];

@@ -88,7 +88,7 @@ impl Shade {
         let resources = [
             Resource::Uniform(io.frame),
             Resource::Sampled(&io.environment.map, io.samplers.linear),
-            Resource::Sampled(&io.environment.entries, io.samplers.nearest),
+            Resource::Sampled(&io.environment.alias, io.samplers.nearest),
             Resource::Buffer(io.arguments),
             Resource::Buffer(io.list),
             Resource::Storage(io.radiance.view),

@@ -1,12 +1,12 @@
 //! Where sample directions come from: point sequences, discrete distributions and the lat-long sphere; f64 twins of `glsl/include`.
 
+pub mod alias;
 pub mod environment;
-pub mod inversion;
 pub mod latlong;
 pub mod sobol;
 
+pub use alias::AliasTable;
 pub use environment::EnvironmentImportance;
-pub use inversion::InversionTable;
 pub use latlong::LatLong;
 
 /// Luminance of linear Rec.709 colour (the Y row of BT.709).
