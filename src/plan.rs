@@ -107,6 +107,7 @@ impl Directions {
     }
 
     /// All directions of a sample.
+    #[cfg(any(test, feature = "offline"))]
     pub fn total(self, area_lights: u32) -> u32 {
         self.brdf + self.environment + self.light * area_lights
     }
