@@ -1,7 +1,8 @@
-//! A Vulkan-native renderer that shades as often as the light field needs.
+#![doc = include_str!("../README.md")]
 
 pub mod config;
 pub mod error;
+mod frame;
 pub mod gpu;
 pub mod light;
 #[cfg(feature = "offline")]
@@ -17,6 +18,8 @@ mod view;
 pub use ash;
 pub use config::{Config, Estimator, GBufferSource};
 pub use error::{Error, Result};
+pub use frame::{EnvironmentUse, FrameInputs, GBufferInput, Output};
+pub use glam;
 pub use gpu::{
     Access, AllocationError, Block, DedicatedAllocator, Host, HostAllocator, ImageRef, Location, MemoryRequest, Missing,
     Requirements, Retired,
@@ -25,5 +28,5 @@ pub use light::Light;
 pub use pass::gbuffer::Draw;
 pub use pass::tonemap::Transfer;
 pub use plan::{Footprint, FootprintRow, memory_footprint};
-pub use renderer::{EnvironmentUse, FrameInputs, GBufferInput, Output, Renderer};
+pub use renderer::Renderer;
 pub use view::View;

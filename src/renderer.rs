@@ -2,7 +2,8 @@
 
 use crate::config::{Config, GBufferSource};
 use crate::error::{Error, Result};
-use crate::gpu::access::{Access, ImageRef};
+use crate::frame::{FrameInputs, GBufferInput, Output};
+use crate::gpu::access::Access;
 use crate::gpu::buffer::Buffer;
 use crate::gpu::context::{Context, Host};
 #[cfg(feature = "offline")]
@@ -13,76 +14,16 @@ use crate::gpu::recorder::{Recorder, States};
 use crate::gpu::retire::{Build, Retired};
 use crate::gpu::sampler::Samplers;
 use crate::gpu::timer::{FrameTimings, GpuTimer};
-use crate::light::{self, Light};
+use crate::light;
 use crate::pass::environment::{EnvironmentImages, EnvironmentUpload};
-use crate::pass::gbuffer::{self, Draw, GBuffer};
+use crate::pass::gbuffer::{self, GBuffer};
 use crate::pass::materials::{MaterialBridge, MaterialImages, MaterialsUpload};
 use crate::pass::{FrameUniform, PassContext, classify, curvature, resolve, shade, tonemap};
 use crate::plan::{Directions, LIGHT_BYTES};
 use crate::reflectance::Model;
 use crate::sampling::LatLong;
 use crate::targets::Targets;
-use crate::view::View;
 use ash::vk;
-
-/// Where this frame's G-buffer comes from; must match [`Config::gbuffer`].
-#[derive(Clone, Copy)]
-pub enum GBufferInput<'a> {
-    /// Meshes to rasterise.
-    Draws(&'a [Draw]),
-    /// The host's own.
-    Host {
-        /// Set 0, allocated with the layout of [`GBufferSource::Host`], unchanged until the frame has finished.
-        set: vk::DescriptorSet,
-        /// The images in it: sampled in compute between their entry and exit.
-        images: &'a [ImageRef],
-    },
-}
-
-/// Where the image goes.
-#[derive(Clone, Copy)]
-pub struct Output {
-    /// A storage image of one of [`tonemap::FORMATS`] and of [`Config::extent`].
-    pub image: ImageRef,
-    /// Linear or display values.
-    pub transfer: tonemap::Transfer,
-}
-
-/// How the environment is used in a frame.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct EnvironmentUse {
-    /// Factor on radiance.
-    pub intensity: f32,
-    /// Degrees about +Y.
-    pub rotation: f32,
-    /// Whether the background shows it; black otherwise.
-    pub visible: bool,
-}
-
-impl Default for EnvironmentUse {
-    fn default() -> Self {
-        Self { intensity: 1.0, rotation: 0.0, visible: false }
-    }
-}
-
-/// Everything that changes from frame to frame.
-#[derive(Clone, Copy)]
-pub struct FrameInputs<'a> {
-    /// Which of [`Config::frames_in_flight`] slots; the work last recorded with it has finished.
-    pub slot: usize,
-    /// Camera.
-    pub view: View,
-    /// Surfaces.
-    pub gbuffer: GBufferInput<'a>,
-    /// Environment.
-    pub environment: EnvironmentUse,
-    /// Lights beside it, at most [`MAX_LIGHTS`](crate::light::MAX_LIGHTS).
-    pub lights: &'a [Light],
-    /// Seed and frame number of the sample points.
-    pub seed: [u32; 2],
-    /// The host's image; `None` leaves the result in the renderer's own.
-    pub output: Option<Output>,
-}
 
 /// Passes of the frame.
 struct Passes {
@@ -92,6 +33,15 @@ struct Passes {
     shade: shade::Shade,
     resolve: resolve::Resolve,
     tonemap: tonemap::Tonemap,
+}
+
+/// Says so when a renderer is dropped instead of destroyed: its handles leak, since submitted work may still use them.
+struct Undestroyed;
+
+impl Drop for Undestroyed {
+    fn drop(&mut self) {
+        log::error!("a renderer was dropped without `destroy` and its handles leak");
+    }
 }
 
 /// The renderer: records frames into the host's command buffers. It never submits and never waits.
@@ -110,6 +60,7 @@ pub struct Renderer {
     targets: Targets,
     environment: Option<EnvironmentImages>,
     materials: Option<MaterialImages>,
+    undestroyed: Undestroyed,
 }
 
 impl Renderer {
@@ -156,6 +107,7 @@ impl Renderer {
             targets,
             environment: None,
             materials: None,
+            undestroyed: Undestroyed,
         })
     }
 
@@ -222,7 +174,7 @@ impl Renderer {
     /// in which they were recorded; the work last recorded with `inputs.slot` has finished; handles in `inputs` are alive
     /// until this frame has finished. Bound pipelines, descriptor sets 0 to 2, push constants and dynamic state are lost.
     pub unsafe fn record(&mut self, cmd: vk::CommandBuffer, inputs: &FrameInputs<'_>) -> Result<()> {
-        self.check(inputs)?;
+        inputs.check(&self.config, self.targets.plan.shading)?;
         let before = "record_environment and record_materials";
         let (Some(environment), Some(materials)) = (&self.environment, &self.materials) else {
             return Err(Error::CallOrder { called: "record", before });
@@ -233,9 +185,9 @@ impl Renderer {
         if let Some(timings) = self.timer.begin_frame(&self.cx, cmd, inputs.slot)? {
             self.timings = Some(timings);
         }
-        let (records, [exact, area]) = light::records(inputs.lights);
-        let uniform =
-            FrameUniform { lights: [exact, area, 0, 0], ..frame_uniform(&self.config, self.targets.plan.shading, inputs) };
+        let (records, counts) = light::records(inputs.lights);
+        let [exact, area] = counts;
+        let uniform = inputs.uniform(&self.config, self.targets.plan.shading, counts);
         self.uniforms[inputs.slot].bytes_mut().copy_from_slice(bytemuck::bytes_of(&uniform));
         let records: &[u8] = bytemuck::cast_slice(&records);
         self.lights[inputs.slot].bytes_mut()[..records.len()].copy_from_slice(records);
@@ -342,36 +294,8 @@ impl Renderer {
         self.bridge.retire(&mut bag);
         self.samplers.retire(&mut bag);
         self.timer.retire(&mut bag);
+        std::mem::forget(self.undestroyed);
         bag
-    }
-
-    fn check(&self, inputs: &FrameInputs<'_>) -> Result<()> {
-        if inputs.slot >= self.config.frames_in_flight {
-            return Err(Error::invalid("slot", format!("below {}", self.config.frames_in_flight), inputs.slot));
-        }
-        inputs.view.validate()?;
-        let EnvironmentUse { intensity, rotation, .. } = inputs.environment;
-        if !(intensity >= 0.0 && intensity.is_finite() && rotation.is_finite()) {
-            return Err(Error::invalid("environment", "finite rotation and intensity >= 0", format!("{:?}", inputs.environment)));
-        }
-        light::check(inputs.lights)?;
-        match inputs.gbuffer {
-            GBufferInput::Draws(draws) => gbuffer::check(draws)?,
-            GBufferInput::Host { images, .. } => {
-                let shading = self.targets.plan.shading;
-                if let Some(i) = images.iter().position(|image| image.extent != shading) {
-                    return Err(Error::invalid(
-                        format!("gbuffer.images[{i}].extent"),
-                        format!("{shading:?}"),
-                        format!("{:?}", images[i].extent),
-                    ));
-                }
-            }
-        }
-        match &inputs.output {
-            Some(output) => tonemap::check(&output.image, output.transfer, self.config.extent),
-            None => Ok(()),
-        }
     }
 
     /// One of the renderer's own colour images of the last frame, by name.
@@ -398,7 +322,7 @@ impl Renderer {
         let (Some(environment), Some(materials)) = (&self.environment, &self.materials) else {
             return Err(Error::CallOrder { called: "record_probe", before: "record_environment and record_materials" });
         };
-        let uniform = frame_uniform(&self.config, self.targets.plan.shading, inputs);
+        let uniform = inputs.uniform(&self.config, self.targets.plan.shading, [0, 0]);
         self.uniforms[inputs.slot].bytes_mut().copy_from_slice(bytemuck::bytes_of(&uniform));
         let rec = &mut Recorder::new(&self.cx, cmd, inputs.slot, &mut self.states, None);
         let bridge = BridgeSets { materials: self.bridge.write(rec, materials, &self.samplers), ..BridgeSets::NONE };
@@ -467,20 +391,5 @@ impl Passes {
         self.shade.retire(bag);
         self.resolve.retire(bag);
         self.tonemap.retire(bag);
-    }
-}
-
-fn frame_uniform(config: &Config, shading: [u32; 2], inputs: &FrameInputs<'_>) -> FrameUniform {
-    let world = inputs.view.world_from_view();
-    let EnvironmentUse { intensity, rotation, visible } = inputs.environment;
-    FrameUniform {
-        world_from_view: [world.x_axis, world.y_axis, world.z_axis].map(|c| c.to_array()),
-        eye: world.w_axis.to_array(),
-        ray: inputs.view.ray().to_array(),
-        extent: [shading[0], shading[1], config.samples_per_side, u32::from(visible)],
-        sampling: [inputs.seed[0], inputs.seed[1], config.directions, 0],
-        // A turn about +Y moves the map towards smaller u.
-        environment: [-rotation / 360.0, intensity, 0.0, 0.0],
-        lights: [0; 4],
     }
 }

@@ -43,8 +43,8 @@ fn whichever_request_fails_nothing_is_kept() {
         // SAFETY: the device outlives the renderer.
         unsafe { Renderer::new(&rig.gpu.host(), &config, &mut rig.memory) }
     });
-    // One block a row of the footprint, and one uniform buffer a slot where the footprint sums them.
-    assert_eq!(requests, memory_footprint(&config).rows.len() + config.frames_in_flight - 1);
+    // One block a row of the footprint, and one buffer a slot where the footprint sums them: frame and lights.
+    assert_eq!(requests, memory_footprint(&config).rows.len() + 2 * (config.frames_in_flight - 1));
 
     let table = Model::Table(Arc::new(stand_in::table("metallic-paint").unwrap()));
     let ((), requests) = until_it_succeeds(&mut rig, |rig| {

@@ -16,9 +16,9 @@ use crate::offline::world::{Camera, World};
 use crate::pass::PassContext;
 use crate::pass::probe::Probe;
 use crate::plan::ARGUMENT_BYTES;
-use crate::renderer::{EnvironmentUse, FrameInputs, GBufferInput, Renderer};
+use crate::renderer::Renderer;
 use crate::sampling::LatLong;
-use crate::{Config, Draw, Light, View};
+use crate::{Config, Draw, EnvironmentUse, FrameInputs, GBufferInput, Light, View};
 use ash::vk;
 use glam::{DMat4, DVec4, Mat4};
 use std::collections::HashMap;
@@ -59,8 +59,8 @@ impl Shown {
 
     fn inputs(&self, seed: [u32; 2]) -> FrameInputs<'_> {
         let Self { view, draws, environment, lights } = self;
-        let gbuffer = GBufferInput::Draws(draws);
-        FrameInputs { slot: 0, view: *view, gbuffer, environment: *environment, lights, seed, output: None }
+        let frame = FrameInputs::new(0, *view, GBufferInput::Draws(draws));
+        FrameInputs { environment: *environment, lights, seed, ..frame }
     }
 }
 

@@ -1,0 +1,121 @@
+//! What a host hands over for one frame.
+
+use crate::config::Config;
+use crate::error::{Error, Result};
+use crate::gpu::access::ImageRef;
+use crate::light::{self, Light};
+use crate::pass::gbuffer::{self, Draw};
+use crate::pass::{FrameUniform, tonemap};
+use crate::view::View;
+use ash::vk;
+
+/// Where this frame's G-buffer comes from; must match [`Config::gbuffer`].
+#[derive(Clone, Copy)]
+pub enum GBufferInput<'a> {
+    /// Meshes to rasterise.
+    Draws(&'a [Draw]),
+    /// The host's own.
+    Host {
+        /// Set 0, allocated with the layout of [`GBufferSource::Host`], unchanged until the frame has finished.
+        set: vk::DescriptorSet,
+        /// The images in it: sampled in compute between their entry and exit.
+        images: &'a [ImageRef],
+    },
+}
+
+/// Where the image goes.
+#[derive(Clone, Copy)]
+pub struct Output {
+    /// A storage image of one of [`tonemap::FORMATS`] and of [`Config::extent`].
+    pub image: ImageRef,
+    /// Linear or display values.
+    pub transfer: tonemap::Transfer,
+}
+
+/// How the environment is used in a frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct EnvironmentUse {
+    /// Factor on radiance.
+    pub intensity: f32,
+    /// Degrees about +Y.
+    pub rotation: f32,
+    /// Whether the background shows it; black otherwise.
+    pub visible: bool,
+}
+
+impl Default for EnvironmentUse {
+    fn default() -> Self {
+        Self { intensity: 1.0, rotation: 0.0, visible: false }
+    }
+}
+
+/// Everything that changes from frame to frame.
+#[derive(Clone, Copy)]
+pub struct FrameInputs<'a> {
+    /// Which of [`Config::frames_in_flight`] slots; the work last recorded with it has finished.
+    pub slot: usize,
+    /// Camera.
+    pub view: View,
+    /// Surfaces.
+    pub gbuffer: GBufferInput<'a>,
+    /// Environment.
+    pub environment: EnvironmentUse,
+    /// Lights beside it, at most [`MAX_LIGHTS`](crate::light::MAX_LIGHTS).
+    pub lights: &'a [Light],
+    /// Seed and frame number of the sample points.
+    pub seed: [u32; 2],
+    /// The host's image; `None` leaves the result in the renderer's own.
+    pub output: Option<Output>,
+}
+
+impl<'a> FrameInputs<'a> {
+    /// A frame under the environment as it is, with no other light and no output but the renderer's own.
+    pub fn new(slot: usize, view: View, gbuffer: GBufferInput<'a>) -> Self {
+        Self { slot, view, gbuffer, environment: EnvironmentUse::default(), lights: &[], seed: [0, 0], output: None }
+    }
+
+    /// Refuses what cannot be recorded with `config` on `shading` samples.
+    pub(crate) fn check(&self, config: &Config, shading: [u32; 2]) -> Result<()> {
+        if self.slot >= config.frames_in_flight {
+            return Err(Error::invalid("slot", format!("below {}", config.frames_in_flight), self.slot));
+        }
+        self.view.validate()?;
+        let EnvironmentUse { intensity, rotation, .. } = self.environment;
+        if !(intensity >= 0.0 && intensity.is_finite() && rotation.is_finite()) {
+            return Err(Error::invalid("environment", "finite rotation and intensity >= 0", format!("{:?}", self.environment)));
+        }
+        light::check(self.lights)?;
+        match self.gbuffer {
+            GBufferInput::Draws(draws) => gbuffer::check(draws)?,
+            GBufferInput::Host { images, .. } => {
+                if let Some(i) = images.iter().position(|image| image.extent != shading) {
+                    return Err(Error::invalid(
+                        format!("gbuffer.images[{i}].extent"),
+                        format!("{shading:?}"),
+                        format!("{:?}", images[i].extent),
+                    ));
+                }
+            }
+        }
+        match &self.output {
+            Some(output) => tonemap::check(&output.image, output.transfer, config.extent),
+            None => Ok(()),
+        }
+    }
+
+    /// What the shaders know of the frame; `exact` and `area` count the lights.
+    pub(crate) fn uniform(&self, config: &Config, shading: [u32; 2], [exact, area]: [u32; 2]) -> FrameUniform {
+        let world = self.view.world_from_view();
+        let EnvironmentUse { intensity, rotation, visible } = self.environment;
+        FrameUniform {
+            world_from_view: [world.x_axis, world.y_axis, world.z_axis].map(|c| c.to_array()),
+            eye: world.w_axis.to_array(),
+            ray: self.view.ray().to_array(),
+            extent: [shading[0], shading[1], config.samples_per_side, u32::from(visible)],
+            sampling: [self.seed[0], self.seed[1], config.directions, 0],
+            // A turn about +Y moves the map towards smaller u.
+            environment: [-rotation / 360.0, intensity, 0.0, 0.0],
+            lights: [exact, area, 0, 0],
+        }
+    }
+}
