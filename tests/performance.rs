@@ -1,7 +1,7 @@
 //! How fast full-rate shading is, held against a kernel that only looks up. Ignored by default, because it needs a quiet
 //! machine and, for its scene, `scripts/fetch-assets bunny environments`:
 //!
-//! `cargo test --release --test performance -- --ignored --nocapture`
+//! `cargo test --test performance -- --ignored --nocapture --test-threads 1`
 
 use passband::offline::headless::{Headless, Options};
 use passband::offline::scene::Scene;
