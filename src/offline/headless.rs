@@ -270,28 +270,16 @@ impl Headless {
 
     /// Handles to build a renderer on.
     pub fn host(&self) -> Host<'_> {
-        Host {
-            instance: &self.instance.instance,
-            physical_device: self.physical_device,
-            device: &self.device,
-            queue_family: self.family,
-            pipeline_cache: vk::PipelineCache::null(),
-            debug_utils: self.debug_device.as_ref(),
-        }
+        host(&self.instance, self.physical_device, &self.device, self.family, self.debug_device.as_ref())
     }
 
     /// The host's handles and its allocator at once.
+    ///
+    /// # Errors
+    /// [`Error::Device`] after the device was closed.
     pub fn parts(&mut self) -> Result<(Host<'_>, &mut PooledAllocator)> {
         let Some(memory) = self.memory.as_mut() else { return Err(Error::Device("the device is closed".into())) };
-        let host = Host {
-            instance: &self.instance.instance,
-            physical_device: self.physical_device,
-            device: &self.device,
-            queue_family: self.family,
-            pipeline_cache: vk::PipelineCache::null(),
-            debug_utils: self.debug_device.as_ref(),
-        };
-        Ok((host, memory))
+        Ok((host(&self.instance, self.physical_device, &self.device, self.family, self.debug_device.as_ref()), memory))
     }
 
     /// Largest number of bytes of device memory that were allocated at once.
@@ -340,6 +328,17 @@ impl Headless {
         }
         Ok(())
     }
+}
+
+fn host<'a>(
+    instance: &'a Instance,
+    physical_device: vk::PhysicalDevice,
+    device: &'a ash::Device,
+    queue_family: u32,
+    debug_utils: Option<&'a ash::ext::debug_utils::Device>,
+) -> Host<'a> {
+    let instance = &instance.instance;
+    Host { instance, physical_device, device, queue_family, pipeline_cache: vk::PipelineCache::null(), debug_utils }
 }
 
 impl Drop for Headless {
