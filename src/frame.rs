@@ -16,7 +16,7 @@ pub enum GBufferInput<'a> {
     Draws(&'a [Draw]),
     /// The host's own.
     Host {
-        /// Set 0, allocated with the layout of [`GBufferSource::Host`], unchanged until the frame has finished.
+        /// Set 0, allocated with the layout of [`crate::GBufferSource::Host`], unchanged until the frame has finished.
         set: vk::DescriptorSet,
         /// The images in it: sampled in compute between their entry and exit.
         images: &'a [ImageRef],

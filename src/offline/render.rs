@@ -67,7 +67,7 @@ pub struct Rendered {
 /// Renders `world`. `progress` is told how many of how many frames are done.
 ///
 /// # Errors
-/// [`crate::offline::Error`] of the settings, the device or the driver.
+/// [`crate::offline::error::Error`] of the settings, the device or the driver.
 pub fn render(world: &World, settings: &Settings, progress: &mut dyn FnMut(u32, u32)) -> Result<Rendered> {
     let config = settings.config();
     config.validate()?;
