@@ -71,7 +71,7 @@ fn torus_knot() {
 }
 
 /// 64 random pixels of each of three 512x512 images under built-in environments at their full 1024x512.
-/// `cargo test --release --test right -- --ignored --nocapture full_size_pixels`
+/// `cargo test --test right -- --ignored --nocapture full_size_pixels`
 #[test]
 #[ignore = "takes minutes"]
 fn full_size_pixels() {
