@@ -53,10 +53,12 @@ impl Folder {
         Run { code: output.status.code().unwrap(), stdout: text(output.stdout), stderr: text(output.stderr) }
     }
 
-    /// `render` on the reference driver; small unless told otherwise.
+    /// `render` on the reference driver under the validation layer, any message of which is a failure; small unless told
+    /// otherwise.
     fn render(&self, scene: &str, args: &[&str]) -> Run {
         let size: &[&str] = if args.contains(&"--size") { &[] } else { &["--size", "8x8"] };
-        self.run(&[&["render", scene, "--device", "llvmpipe"], size, args].concat())
+        let validate: &[&str] = if args.contains(&"--validate") { &[] } else { &["--validate"] };
+        self.run(&[&["render", scene, "--device", "llvmpipe"], size, validate, args].concat())
     }
 
     fn exr(&self, name: &str) -> LinearImage {
