@@ -1,5 +1,6 @@
 #version 460
 // Writes the G-buffer in the encoding that glsl/bridge/gbuffer.glsl reads.
+#include "tangent.glsl"
 
 layout(push_constant) uniform Push {
     mat4 clip_from_object;
@@ -9,16 +10,18 @@ layout(push_constant) uniform Push {
 
 layout(location = 0) in vec3 world_normal;
 layout(location = 1) in vec2 uv;
+layout(location = 2) in vec4 world_tangent;
 
 layout(location = 0) out vec4 surface;
 layout(location = 1) out uint ids;
-layout(location = 2) out vec2 coordinate;
+layout(location = 2) out vec4 coordinate;
 layout(location = 3) out vec4 derivative;
 
 void main() {
     // The interpolated reciprocal of w is 1/depth along the view axis for every pinhole projection.
-    surface = vec4(normalize(world_normal), 1.0 / gl_FragCoord.w);
+    vec3 n = normalize(world_normal);
+    surface = vec4(n, 1.0 / gl_FragCoord.w);
     ids = push.id.x;
-    coordinate = uv;
+    coordinate = vec4(uv, tangent_encode(n, world_tangent.xyz, world_tangent.w), 0.0);
     derivative = vec4(dFdx(uv), dFdy(uv));
 }

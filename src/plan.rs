@@ -49,7 +49,7 @@ pub(crate) const LIGHT_BYTES: u64 = (MAX_LIGHTS * size_of::<LightRecord>()) as u
 impl Plan {
     pub fn of(config: &Config) -> Self {
         let shading = config.extent.map(|e| e.saturating_mul(config.samples_per_side));
-        let image = |name, format, [w, h]: [u32; 2], usage| ImageDesc { name, format, extent: [w, h, 1], usage };
+        let image = |name, format, [w, h]: [u32; 2], usage| ImageDesc::new(name, format, [w, h, 1], usage);
         let sampled = vk::ImageUsageFlags::SAMPLED | vk::ImageUsageFlags::TRANSFER_SRC;
         let target = sampled | vk::ImageUsageFlags::COLOR_ATTACHMENT;
         let storage = sampled | vk::ImageUsageFlags::STORAGE;
@@ -60,7 +60,7 @@ impl Plan {
                 [
                     image("surface", vk::Format::R32G32B32A32_SFLOAT, shading, target),
                     image("ids", vk::Format::R32_UINT, shading, target),
-                    image("coordinate", vk::Format::R32G32_SFLOAT, shading, target),
+                    image("coordinate", vk::Format::R32G32B32A32_SFLOAT, shading, target),
                     image("derivative", vk::Format::R32G32B32A32_SFLOAT, shading, target),
                     image("depth", vk::Format::D32_SFLOAT, shading, vk::ImageUsageFlags::DEPTH_STENCIL_ATTACHMENT),
                 ]
@@ -139,8 +139,8 @@ mod tests {
         assert_eq!(list(&memory_footprint(&base)), Some(4 * pixels));
         let fine = Config { samples_per_side: 4, ..base.clone() };
         assert_eq!(list(&memory_footprint(&fine)), Some(16 * 4 * pixels));
-        // surface, derivative, radiance 16 bytes; coordinate 8; ids, depth, list 4; resolved 16
-        assert_eq!(memory_footprint(&base).total(), pixels * (3 * 16 + 8 + 3 * 4 + 16) + 16 + 2 * (144 + 256 * 64));
+        // surface, coordinate, derivative, radiance 16 bytes; ids, depth, list 4; resolved 16
+        assert_eq!(memory_footprint(&base).total(), pixels * (4 * 16 + 3 * 4 + 16) + 16 + 2 * (144 + 256 * 64));
     }
 
     #[test]

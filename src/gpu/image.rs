@@ -13,10 +13,19 @@ pub(crate) struct ImageDesc {
     pub format: vk::Format,
     /// Width, height, depth; a depth above 1 makes it 3-D.
     pub extent: [u32; 3],
+    /// Layers of an array of 2-D images; `None` for an image that is no array.
+    pub layers: Option<u32>,
+    /// Mip levels.
+    pub levels: u32,
     pub usage: vk::ImageUsageFlags,
 }
 
 impl ImageDesc {
+    /// One level, no array.
+    pub fn new(name: &'static str, format: vk::Format, extent: [u32; 3], usage: vk::ImageUsageFlags) -> Self {
+        Self { name, format, extent, layers: None, levels: 1, usage }
+    }
+
     pub fn aspect(&self) -> vk::ImageAspectFlags {
         match self.format {
             vk::Format::D32_SFLOAT => vk::ImageAspectFlags::DEPTH,
@@ -24,9 +33,15 @@ impl ImageDesc {
         }
     }
 
+    /// Width, height and depth of a level.
+    pub fn level_extent(&self, level: u32) -> [u32; 3] {
+        self.extent.map(|e| (e >> level).max(1))
+    }
+
     /// Bytes of the texels, without the driver's padding.
     pub fn bytes(&self) -> u64 {
-        self.extent.iter().map(|&e| u64::from(e)).product::<u64>() * texel_bytes(self.format)
+        let texels = |level| self.level_extent(level).iter().map(|&e| u64::from(e)).product::<u64>();
+        (0..self.levels).map(texels).sum::<u64>() * u64::from(self.layers.unwrap_or(1)) * texel_bytes(self.format)
     }
 }
 
@@ -54,7 +69,9 @@ impl Image {
         let device = &build.cx.device;
         let [width, height, depth] = desc.extent;
         let limits = &build.cx.limits;
-        let (kind, view_kind, limit) = if depth > 1 {
+        let (kind, view_kind, limit) = if desc.layers.is_some() {
+            (vk::ImageType::TYPE_2D, vk::ImageViewType::TYPE_2D_ARRAY, limits.max_image_dimension2_d)
+        } else if depth > 1 {
             (vk::ImageType::TYPE_3D, vk::ImageViewType::TYPE_3D, limits.max_image_dimension3_d)
         } else {
             (vk::ImageType::TYPE_2D, vk::ImageViewType::TYPE_2D, limits.max_image_dimension2_d)
@@ -66,12 +83,17 @@ impl Image {
                 format!("{:?}", desc.extent),
             ));
         }
+        let layers = desc.layers.unwrap_or(1);
+        if layers == 0 || layers > limits.max_image_array_layers {
+            let expected = format!("1 to {}", limits.max_image_array_layers);
+            return Err(Error::invalid(format!("layers of image {}", desc.name), expected, layers));
+        }
         let info = vk::ImageCreateInfo::default()
             .image_type(kind)
             .format(desc.format)
             .extent(vk::Extent3D { width, height, depth })
-            .mip_levels(1)
-            .array_layers(1)
+            .mip_levels(desc.levels)
+            .array_layers(layers)
             .samples(vk::SampleCountFlags::TYPE_1)
             .usage(desc.usage);
         // SAFETY: the device is alive; the description is checked above and by Requirements.
@@ -84,8 +106,12 @@ impl Image {
         build.track_block(&block);
         // SAFETY: the block satisfies the image's requirements and is unshared.
         unsafe { device.bind_image_memory(handle, block.memory, block.offset) }.named("vkBindImageMemory")?;
-        let range =
-            vk::ImageSubresourceRange { aspect_mask: desc.aspect(), level_count: 1, layer_count: 1, ..Default::default() };
+        let range = vk::ImageSubresourceRange {
+            aspect_mask: desc.aspect(),
+            level_count: desc.levels,
+            layer_count: layers,
+            ..Default::default()
+        };
         let info =
             vk::ImageViewCreateInfo::default().image(handle).view_type(view_kind).format(desc.format).subresource_range(range);
         // SAFETY: the image is bound.

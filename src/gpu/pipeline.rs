@@ -305,13 +305,13 @@ pub(crate) struct RasterPipeline {
 }
 
 impl RasterPipeline {
-    /// `vertices` are tightly packed streams: binding and location i of format i.
+    /// `vertices` are streams, binding and location i of format i, whose strides are bound with them.
     pub fn new(
         build: &mut Build<'_>,
         modules: &Modules,
         name: &str,
         push_bytes: u32,
-        vertices: &[(vk::Format, u32)],
+        vertices: &[vk::Format],
         colors: &[vk::Format],
         depth: vk::Format,
     ) -> Result<Self> {
@@ -335,9 +335,9 @@ impl RasterPipeline {
         let stages = [stage(vertex, vk::ShaderStageFlags::VERTEX), stage(fragment, vk::ShaderStageFlags::FRAGMENT)];
         let (bindings, attributes): (Vec<_>, Vec<_>) = (0u32..)
             .zip(vertices)
-            .map(|(i, &(format, stride))| {
+            .map(|(i, &format)| {
                 (
-                    vk::VertexInputBindingDescription { binding: i, stride, input_rate: vk::VertexInputRate::VERTEX },
+                    vk::VertexInputBindingDescription { binding: i, stride: 0, input_rate: vk::VertexInputRate::VERTEX },
                     vk::VertexInputAttributeDescription { location: i, binding: i, format, offset: 0 },
                 )
             })
@@ -359,8 +359,11 @@ impl RasterPipeline {
         let write = vk::PipelineColorBlendAttachmentState::default().color_write_mask(vk::ColorComponentFlags::RGBA);
         let attachments = vec![write; colors.len()];
         let blend = vk::PipelineColorBlendStateCreateInfo::default().attachments(&attachments);
-        let dynamic = vk::PipelineDynamicStateCreateInfo::default()
-            .dynamic_states(&[vk::DynamicState::VIEWPORT, vk::DynamicState::SCISSOR]);
+        let dynamic = vk::PipelineDynamicStateCreateInfo::default().dynamic_states(&[
+            vk::DynamicState::VIEWPORT,
+            vk::DynamicState::SCISSOR,
+            vk::DynamicState::VERTEX_INPUT_BINDING_STRIDE,
+        ]);
         let mut rendering =
             vk::PipelineRenderingCreateInfo::default().color_attachment_formats(colors).depth_attachment_format(depth);
         let info = vk::GraphicsPipelineCreateInfo::default()

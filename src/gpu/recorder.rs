@@ -144,8 +144,8 @@ impl<'a> Recorder<'a> {
                     .image(image)
                     .subresource_range(vk::ImageSubresourceRange {
                         aspect_mask,
-                        level_count: 1,
-                        layer_count: 1,
+                        level_count: vk::REMAINING_MIP_LEVELS,
+                        layer_count: vk::REMAINING_ARRAY_LAYERS,
                         ..Default::default()
                     })
             })

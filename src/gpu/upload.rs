@@ -23,7 +23,7 @@ pub(crate) struct ImageUpload {
 }
 
 impl ImageUpload {
-    /// `texels` are tightly packed rows (and slices) of `desc.format`.
+    /// `texels` are tightly packed rows (and slices) of `desc.format`; all layers of level 0, then of level 1, and so on.
     pub fn new(build: &mut Build<'_>, mut desc: ImageDesc, texels: &[u8]) -> Result<Self> {
         debug_assert_eq!(texels.len() as u64, desc.bytes(), "{}", desc.name);
         desc.usage |= vk::ImageUsageFlags::TRANSFER_DST;
@@ -34,16 +34,27 @@ impl ImageUpload {
     pub fn record(self, rec: &mut Recorder<'_>, bag: &mut Retired) -> Image {
         rec.overwrite(&self.image, Access::TRANSFER_WRITE);
         rec.flush();
-        let [width, height, depth] = self.image.desc.extent;
-        let region = vk::BufferImageCopy {
-            image_subresource: vk::ImageSubresourceLayers {
-                aspect_mask: self.image.desc.aspect(),
-                layer_count: 1,
-                ..Default::default()
-            },
-            image_extent: vk::Extent3D { width, height, depth },
-            ..Default::default()
-        };
+        let desc = self.image.desc;
+        let layer_count = desc.layers.unwrap_or(1);
+        let mut offset = 0;
+        let regions: Vec<_> = (0..desc.levels)
+            .map(|mip_level| {
+                let [width, height, depth] = desc.level_extent(mip_level);
+                let region = vk::BufferImageCopy {
+                    buffer_offset: offset,
+                    image_subresource: vk::ImageSubresourceLayers {
+                        aspect_mask: desc.aspect(),
+                        mip_level,
+                        layer_count,
+                        ..Default::default()
+                    },
+                    image_extent: vk::Extent3D { width, height, depth },
+                    ..Default::default()
+                };
+                offset += ImageDesc { extent: [width, height, depth], levels: 1, ..desc }.bytes();
+                region
+            })
+            .collect();
         // SAFETY: the command buffer is recording; the staging buffer holds the whole image; host writes before submission
         // are visible to it.
         unsafe {
@@ -52,7 +63,7 @@ impl ImageUpload {
                 self.staging.handle,
                 self.image.handle,
                 vk::ImageLayout::TRANSFER_DST_OPTIMAL,
-                &[region],
+                &regions,
             );
         }
         self.staging.retire(bag);

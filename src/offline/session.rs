@@ -32,6 +32,7 @@ struct MeshBuffers {
     positions: Buffer,
     normals: Buffer,
     coordinates: Buffer,
+    tangents: Option<Buffer>,
     indices: Buffer,
     count: u32,
 }
@@ -129,6 +130,7 @@ impl Session {
                 positions: (mesh.positions.handle, 0),
                 normals: (mesh.normals.handle, 0),
                 coordinates: (mesh.coordinates.handle, 0),
+                tangents: mesh.tangents.as_ref().map(|b| (b.handle, 0)),
                 indices: (mesh.indices.handle, 0),
                 index_count: mesh.count,
                 world_from_object: object.transform.to_cols_array(),
@@ -145,19 +147,26 @@ impl Session {
         self.headless.submit(|cmd, memory| {
             let vertex = vk::BufferUsageFlags::VERTEX_BUFFER;
             let uploads = Build::run(renderer.context(), memory, |build| {
-                Ok([
+                let tangents: &[u8] = bytemuck::cast_slice(&mesh.tangents);
+                let uploads = [
                     BufferUpload::new(build, "positions", vertex, bytemuck::cast_slice(&mesh.positions))?,
                     BufferUpload::new(build, "normals", vertex, bytemuck::cast_slice(&mesh.normals))?,
                     BufferUpload::new(build, "coordinates", vertex, bytemuck::cast_slice(&mesh.uvs))?,
                     BufferUpload::new(build, "indices", vk::BufferUsageFlags::INDEX_BUFFER, bytemuck::cast_slice(&mesh.indices))?,
-                ])
+                ];
+                let tangents =
+                    (!tangents.is_empty()).then(|| BufferUpload::new(build, "tangents", vertex, tangents)).transpose()?;
+                Ok((uploads, tangents))
             })?;
             let mut bag = Retired::default();
             // The wait at the end of the submission is all the synchronization that vertex input needs.
             let mut states = States::default();
             let mut rec = Recorder::new(renderer.context(), cmd, 0, &mut states, None);
+            let (uploads, tangents) = uploads;
             let [positions, normals, coordinates, indices] = uploads.map(|u| u.record(&mut rec, &mut bag));
-            uploaded = Some(MeshBuffers { positions, normals, coordinates, indices, count: mesh.indices.len() as u32 });
+            let tangents = tangents.map(|u| u.record(&mut rec, &mut bag));
+            let count = mesh.indices.len() as u32;
+            uploaded = Some(MeshBuffers { positions, normals, coordinates, tangents, indices, count });
             Ok(bag)
         })?;
         uploaded.ok_or_else(closed)
@@ -306,9 +315,8 @@ impl Drop for Session {
     fn drop(&mut self) {
         let mut bag = self.renderer.take().map_or_else(Retired::default, Renderer::destroy);
         for mesh in self.meshes.drain(..) {
-            for buffer in [mesh.positions, mesh.normals, mesh.coordinates, mesh.indices] {
-                buffer.retire(&mut bag);
-            }
+            let all = [mesh.positions, mesh.normals, mesh.coordinates, mesh.indices];
+            all.into_iter().chain(mesh.tangents).for_each(|buffer| buffer.retire(&mut bag));
         }
         if let Ok((host, memory)) = self.headless.parts() {
             // SAFETY: every submission was waited for.

@@ -42,11 +42,8 @@ impl EnvironmentUpload {
         let radiance: Vec<[f32; 4]> =
             map.texels().iter().zip(importance.density_texels()).map(|(&[r, g, b], density)| [r, g, b, density]).collect();
         let slots = importance.alias().packed();
-        let desc = |name, format, [width, height]: [u32; 2]| ImageDesc {
-            name,
-            format,
-            extent: [width, height, 1],
-            usage: vk::ImageUsageFlags::SAMPLED,
+        let desc = |name, format, [width, height]: [u32; 2]| {
+            ImageDesc::new(name, format, [width, height, 1], vk::ImageUsageFlags::SAMPLED)
         };
         let radiance_desc = desc("environment", vk::Format::R32G32B32A32_SFLOAT, [map.width(), map.height()]);
         let alias_desc =

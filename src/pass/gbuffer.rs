@@ -2,7 +2,9 @@
 
 use crate::error::{Error, Result};
 use crate::gpu::access::Access;
+use crate::gpu::buffer::Buffer;
 use crate::gpu::image::{Image, ImageDesc};
+use crate::gpu::memory::Location;
 use crate::gpu::pipeline::{RasterPipeline, Resource, Sets, set_layout, write_set};
 use crate::gpu::recorder::Recorder;
 use crate::gpu::retire::{Build, Handle, Retired};
@@ -19,8 +21,9 @@ pub const NAME: &str = "gbuffer";
 pub const BRIDGE: [vk::DescriptorType; 4] = [vk::DescriptorType::COMBINED_IMAGE_SAMPLER; 4];
 
 const COLORS: [vk::Format; 4] =
-    [vk::Format::R32G32B32A32_SFLOAT, vk::Format::R32_UINT, vk::Format::R32G32_SFLOAT, vk::Format::R32G32B32A32_SFLOAT];
+    [vk::Format::R32G32B32A32_SFLOAT, vk::Format::R32_UINT, vk::Format::R32G32B32A32_SFLOAT, vk::Format::R32G32B32A32_SFLOAT];
 const DEPTH: vk::Format = vk::Format::D32_SFLOAT;
+const NO_TANGENT: [u8; 16] = [0; 16];
 
 #[repr(C)]
 #[derive(Clone, Copy, Pod, Zeroable)]
@@ -40,6 +43,9 @@ pub struct Draw {
     pub normals: (vk::Buffer, u64),
     /// `R32G32_SFLOAT` texture coordinates and byte offset.
     pub coordinates: (vk::Buffer, u64),
+    /// `R32G32B32A32_SFLOAT` tangents and byte offset, for normal maps and reflectances that depend on the azimuth: direction of
+    /// growing `u`, and handedness `w`, where growing `v` is `w * cross(normal, tangent)`. Without them neither knows its azimuth.
+    pub tangents: Option<(vk::Buffer, u64)>,
     /// 32-bit indices and byte offset.
     pub indices: (vk::Buffer, u64),
     /// Indices to draw.
@@ -58,7 +64,7 @@ pub(crate) struct GBufferImages {
     surface: Image,
     /// 0 for nothing, else (object << 16 | material) + 1.
     ids: Image,
-    /// Texture coordinate.
+    /// Texture coordinate; tangent as `glsl/include/tangent.glsl` encodes it.
     coordinate: Image,
     /// d(uv)/dx, d(uv)/dy in texture units a sample.
     derivative: Image,
@@ -95,17 +101,27 @@ pub(crate) struct Io<'a> {
 /// The pipeline, and set 0 for the passes that read the result.
 pub(crate) struct GBuffer {
     pipeline: RasterPipeline,
+    /// One tangent of zero length, for all vertices of draws without.
+    no_tangent: Buffer,
     pub layout: vk::DescriptorSetLayout,
     sets: Sets,
 }
 
 impl GBuffer {
     pub fn new(p: &mut PassContext<'_, '_>) -> Result<Self> {
-        let streams = [(vk::Format::R32G32B32_SFLOAT, 12), (vk::Format::R32G32B32_SFLOAT, 12), (vk::Format::R32G32_SFLOAT, 8)];
+        let streams = [
+            vk::Format::R32G32B32_SFLOAT,
+            vk::Format::R32G32B32_SFLOAT,
+            vk::Format::R32G32_SFLOAT,
+            vk::Format::R32G32B32A32_SFLOAT,
+        ];
         let pipeline = RasterPipeline::new(p.build, p.modules, NAME, size_of::<Push>() as u32, &streams, &COLORS, DEPTH)?;
+        let mut no_tangent =
+            Buffer::new(p.build, "no tangent", NO_TANGENT.len() as u64, vk::BufferUsageFlags::VERTEX_BUFFER, Location::Upload)?;
+        no_tangent.bytes_mut().copy_from_slice(&NO_TANGENT);
         let layout = set_layout(p.build, vk::ShaderStageFlags::COMPUTE, &BRIDGE)?;
         let sets = Sets::new(p.build, layout, &BRIDGE, p.slots)?;
-        Ok(Self { pipeline, layout, sets })
+        Ok(Self { pipeline, no_tangent, layout, sets })
     }
 
     pub fn record(&self, rec: &mut Recorder<'_>, io: &Io<'_>) {
@@ -166,12 +182,14 @@ impl GBuffer {
             id: [(draw.object << 16 | draw.material) + 1, 0, 0, 0],
         };
         let stages = vk::ShaderStageFlags::VERTEX | vk::ShaderStageFlags::FRAGMENT;
-        let streams = [draw.positions, draw.normals, draw.coordinates];
+        let tangents = draw.tangents.unwrap_or((self.no_tangent.handle, 0));
+        let streams = [draw.positions, draw.normals, draw.coordinates, tangents];
+        let strides = [12, 12, 8, if draw.tangents.is_some() { 16 } else { 0 }];
         let device = &rec.cx.device;
         // SAFETY: inside the rendering; the host promises that its buffers hold what `Draw` says.
         unsafe {
             device.cmd_push_constants(rec.cmd, self.pipeline.layout, stages, 0, bytemuck::bytes_of(&push));
-            device.cmd_bind_vertex_buffers(rec.cmd, 0, &streams.map(|s| s.0), &streams.map(|s| s.1));
+            device.cmd_bind_vertex_buffers2(rec.cmd, 0, &streams.map(|s| s.0), &streams.map(|s| s.1), None, Some(&strides));
             device.cmd_bind_index_buffer(rec.cmd, draw.indices.0, draw.indices.1, vk::IndexType::UINT32);
             device.cmd_draw_indexed(rec.cmd, draw.index_count, 1, 0, 0, 0);
         }
@@ -188,6 +206,7 @@ impl GBuffer {
 
     pub fn retire(self, bag: &mut Retired) {
         self.pipeline.retire(bag);
+        self.no_tangent.retire(bag);
         self.sets.retire(bag);
         bag.push(Handle::SetLayout(self.layout));
     }

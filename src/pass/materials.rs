@@ -162,7 +162,7 @@ impl MaterialsUpload {
         let records = records(models, &tables, atlas[0]);
         let packed: Vec<_> = tables.all.iter().map(|(table, scale)| table.packed_at(*scale)).collect();
         let importance: Vec<_> = models.iter().map(|m| ImportanceTable::build(m)).collect();
-        let image = |name, format, extent| ImageDesc { name, format, extent, usage: vk::ImageUsageFlags::SAMPLED };
+        let image = |name, format, extent| ImageDesc::new(name, format, extent, vk::ImageUsageFlags::SAMPLED);
         let angles = VIEW_ANGLES as u32;
         let count = models.len() as u32;
         let table_extent = [PHI_DIFF as u32, THETA_DIFF as u32 * atlas[0], THETA_HALF as u32 * atlas[1]];

@@ -154,7 +154,7 @@ impl Rig {
         self.meshes.push(buffers);
         let index_count = mesh.indices.len() as u32;
         let world_from_object = glam::Mat4::IDENTITY.to_cols_array();
-        Draw { positions, normals, coordinates, indices, index_count, world_from_object, material: 0, object }
+        Draw { positions, normals, coordinates, tangents: None, indices, index_count, world_from_object, material: 0, object }
     }
 
     /// One frame of `draws` in slot 0: linear radiance and coverage.

@@ -34,6 +34,10 @@ vec2 gbuffer_uv(ivec2 p) {
     return vec2(0.0);
 }
 
+vec4 gbuffer_tangent(ivec2 p) {
+    return vec4(0.0);
+}
+
 vec4 gbuffer_footprint(ivec2 p) {
     return vec4(0.0);
 }
