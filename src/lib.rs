@@ -5,6 +5,7 @@ pub mod error;
 mod frame;
 pub mod gpu;
 pub mod light;
+pub mod material;
 #[cfg(feature = "offline")]
 pub mod offline;
 pub mod pass;
@@ -13,6 +14,7 @@ pub mod reflectance;
 mod renderer;
 pub mod sampling;
 mod targets;
+pub mod texture;
 mod view;
 
 pub use ash;
@@ -25,8 +27,10 @@ pub use gpu::{
     Requirements, Retired,
 };
 pub use light::Light;
+pub use material::{Maps, Material, PointMaterial, Roughness};
 pub use pass::gbuffer::Draw;
 pub use pass::tonemap::Transfer;
 pub use plan::{Footprint, FootprintRow, memory_footprint};
 pub use renderer::Renderer;
+pub use texture::Texture;
 pub use view::View;

@@ -69,8 +69,21 @@ impl Vmf {
             let expected = format!("lobes whose projected area is at least {LEAST_PROJECTED_AREA} of their weight");
             return Err(Error::invalid("vmf", expected, area));
         }
+        Ok(Self::over(area, lobes))
+    }
+
+    fn over(area: f64, lobes: Vec<Lobe>) -> Self {
         let peaks = lobes.iter().map(|l| l.weight * normalisation(l.kappa) / area).collect();
-        Ok(Self { lobes, peaks })
+        Self { lobes, peaks }
+    }
+
+    /// The mixture with every lobe's concentration replaced by `kappa`, at least 0. Where its projected area would be less
+    /// than 0.05 of its weight, which [`Self::new`] refuses, it counts as that much.
+    pub(crate) fn with_concentration(&self, kappa: f64) -> Self {
+        let lobes: Vec<_> = self.lobes.iter().map(|l| Lobe { kappa, ..*l }).collect();
+        let weight: f64 = lobes.iter().map(|l| l.weight).sum();
+        let facing: f64 = lobes.iter().map(|l| l.weight * l.mu.z).sum();
+        Self::over((mean_cosine(kappa) * facing / weight).max(LEAST_PROJECTED_AREA), lobes)
     }
 
     /// The lobes, mean directions of length one.

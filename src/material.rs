@@ -1,0 +1,218 @@
+//! A reflectance and the textures that vary it over a surface; the f64 twin of looking them up.
+
+use crate::error::{Error, Result};
+use crate::reflectance::{BlinnPhong, Ggx, Model, Reflectance};
+use crate::texture::{Format, Texture};
+use glam::{DVec2, DVec3};
+use std::f64::consts::PI;
+use std::sync::Arc;
+
+/// The least GGX alpha that a map gives: a smooth mirror has no finite lobe.
+pub const LEAST_ALPHA: f64 = 1e-3;
+
+/// The greatest exponent or concentration that a map gives, that of an alpha of [`LEAST_ALPHA`].
+pub const MOST_CONCENTRATION: f64 = 2.0 / (LEAST_ALPHA * LEAST_ALPHA);
+
+/// What the values of a roughness map are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Roughness {
+    /// GGX alpha.
+    Alpha,
+    /// Concentration of a von Mises-Fisher lobe of normals, 2 / alpha^2.
+    Kappa,
+}
+
+/// Textures over a surface's coordinates.
+#[derive(Clone, Debug)]
+pub struct Maps {
+    /// [`Format::Srgb8`] or [`Format::Half4`]: multiplies the diffuse albedo of GGX and Blinn-Phong and the whole of a table;
+    /// vMF lobes have no base, and get a diffuse one of this albedo.
+    pub albedo: Option<Arc<Texture>>,
+    /// [`Format::Srgb8`] or [`Format::Half4`]: multiplies `f0`, `specular`, or every lobe's weight. Not for tables.
+    pub specular: Option<Arc<Texture>>,
+    /// [`Format::Half2`]: the shading normal in the tangent frame.
+    pub normal: Option<Arc<Texture>>,
+    /// [`Format::Half1`]: stands in the place of the model's own alpha, exponent or (all lobes') concentration, clamped to what
+    /// these may be. Not for tables.
+    pub roughness: Option<(Arc<Texture>, Roughness)>,
+    /// Factors on the coordinates: how many times the maps repeat.
+    pub tiling: [f32; 2],
+}
+
+impl Default for Maps {
+    fn default() -> Self {
+        Self { albedo: None, specular: None, normal: None, roughness: None, tiling: [1.0; 2] }
+    }
+}
+
+impl Maps {
+    /// Albedo, specular, normal and roughness.
+    pub(crate) fn textures(&self) -> [Option<&Arc<Texture>>; 4] {
+        [self.albedo.as_ref(), self.specular.as_ref(), self.normal.as_ref(), self.roughness.as_ref().map(|r| &r.0)]
+    }
+
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.textures().iter().all(Option::is_none)
+    }
+}
+
+/// What a surface is made of.
+#[derive(Clone, Debug)]
+pub struct Material {
+    /// The reflectance.
+    pub model: Model,
+    /// What varies it.
+    pub maps: Maps,
+}
+
+impl From<Model> for Material {
+    fn from(model: Model) -> Self {
+        Self { model, maps: Maps::default() }
+    }
+}
+
+/// What the maps say at a point.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PointMaterial {
+    /// Unit shading normal in the tangent frame.
+    pub normal: DVec3,
+    /// Factor of the albedo map; of vMF lobes, which need one to have a base, 0 without a map.
+    pub albedo: DVec3,
+    /// Factor of the specular map.
+    pub specular: DVec3,
+    /// The model's alpha, exponent or concentration, if there is a map of it.
+    pub roughness: Option<f64>,
+}
+
+impl Material {
+    /// Refuses parameters and maps that the model does not take.
+    ///
+    /// # Errors
+    /// [`Error::InvalidInput`] for a model that is not valid, a map in a format that is not its own, a specular or roughness
+    /// map on a table, or a tiling that is not above 0.
+    pub fn validate(&self) -> Result<()> {
+        match &self.model {
+            Model::Ggx(ggx) => ggx.validate()?,
+            Model::BlinnPhong(blinn_phong) => blinn_phong.validate()?,
+            Model::Table(_) | Model::Turned(_) | Model::Vmf(_) => {}
+        }
+        let table = matches!(self.model, Model::Table(_) | Model::Turned(_));
+        let colour: &[Format] = &[Format::Srgb8, Format::Half4];
+        let formats = [("albedo", colour), ("specular", colour), ("normal", &[Format::Half2]), ("roughness", &[Format::Half1])];
+        for ((map, formats), texture) in formats.into_iter().zip(self.maps.textures()) {
+            let Some(texture) = texture else { continue };
+            if !formats.contains(&texture.format()) {
+                return Err(Error::invalid(format!("maps.{map}"), format!("{formats:?}"), format!("{:?}", texture.format())));
+            }
+            if table && matches!(map, "specular" | "roughness") {
+                return Err(Error::invalid(format!("maps.{map}"), "none on a tabulated reflectance", "one"));
+            }
+        }
+        if !self.maps.tiling.iter().all(|t| t.is_finite() && *t > 0.0) {
+            return Err(Error::invalid("maps.tiling", "two finite numbers > 0", format!("{:?}", self.maps.tiling)));
+        }
+        Ok(())
+    }
+
+    /// What the maps hold at `uv`, where a pixel has the extent `footprint`: the derivatives of `uv` by its x and y, before
+    /// tiling. Colours come through their mips at the level that hardware chooses without anisotropy; normals and roughness
+    /// from level 0.
+    pub fn at(&self, uv: DVec2, footprint: [DVec2; 2]) -> PointMaterial {
+        let Maps { albedo, specular, normal, roughness, tiling } = &self.maps;
+        let tiling = DVec2::from(tiling.map(f64::from));
+        let place = uv * tiling;
+        let colour = |map: &Arc<Texture>| map.sample(place, lod(footprint.map(|d| d * tiling), map.size())).truncate();
+        let without = if matches!(self.model, Model::Vmf(_)) { DVec3::ZERO } else { DVec3::ONE };
+        PointMaterial {
+            normal: normal.as_ref().map_or(DVec3::Z, |map| unit(map.sample(place, 0.0).truncate().truncate())),
+            albedo: albedo.as_ref().map_or(without, colour),
+            specular: specular.as_ref().map_or(DVec3::ONE, colour),
+            roughness: roughness.as_ref().map(|(map, kind)| self.model.roughness_from(*kind, map.sample(place, 0.0).x)),
+        }
+    }
+}
+
+/// The level whose texels are as large as the longer of the derivatives `footprint` of a texture's coordinates; at least 0.
+fn lod(footprint: [DVec2; 2], size: [u32; 2]) -> f64 {
+    let size = DVec2::from(size.map(f64::from));
+    let [x, y] = footprint.map(|d| (d * size).length());
+    x.max(y).max(1.0).log2()
+}
+
+/// The unit vector over x and y that faces up.
+fn unit(xy: DVec2) -> DVec3 {
+    xy.extend((1.0 - xy.length_squared()).max(0.0).sqrt()).normalize()
+}
+
+impl Model {
+    /// The model's own parameter from a value of a roughness map.
+    fn roughness_from(&self, kind: Roughness, value: f64) -> f64 {
+        let value = value.max(0.0);
+        let (alpha, concentration) = match kind {
+            Roughness::Alpha => (value, 2.0 / (value * value)),
+            Roughness::Kappa => ((2.0 / value).sqrt(), value),
+        };
+        match (self, kind) {
+            (Self::BlinnPhong(_), Roughness::Alpha) => (concentration - 2.0).clamp(0.0, MOST_CONCENTRATION),
+            (Self::BlinnPhong(_), Roughness::Kappa) | (Self::Vmf(_), _) => concentration.clamp(0.0, MOST_CONCENTRATION),
+            (Self::Ggx(_) | Self::Table(_) | Self::Turned(_), _) => alpha.clamp(LEAST_ALPHA, 1.0),
+        }
+    }
+}
+
+impl PointMaterial {
+    /// `model` as the maps make it. Albedos and reflectances at normal incidence are clamped to 1 where the model's are at most
+    /// that.
+    pub fn reflectance(&self, model: &Model) -> PointReflectance {
+        let plain = |model| PointReflectance { model, scale: DVec3::ONE, base: DVec3::ZERO };
+        let at_most_one = |c: DVec3| c.clamp(DVec3::ZERO, DVec3::ONE);
+        let albedo = |c: DVec3| at_most_one(c * self.albedo);
+        let specular = |c: DVec3| at_most_one(c * self.specular);
+        match model {
+            Model::Ggx(g) => {
+                plain(Model::Ggx(Ggx { alpha: self.roughness.unwrap_or(g.alpha), f0: specular(g.f0), albedo: albedo(g.albedo) }))
+            }
+            Model::BlinnPhong(b) => plain(Model::BlinnPhong(BlinnPhong {
+                exponent: self.roughness.unwrap_or(b.exponent),
+                specular: specular(b.specular),
+                albedo: albedo(b.albedo),
+            })),
+            Model::Vmf(vmf) => PointReflectance {
+                model: self.roughness.map_or_else(|| model.clone(), |kappa| Model::Vmf(Arc::new(vmf.with_concentration(kappa)))),
+                scale: self.specular,
+                base: albedo(DVec3::ONE),
+            },
+            Model::Table(_) | Model::Turned(_) => PointReflectance { scale: self.albedo, ..plain(model.clone()) },
+        }
+    }
+}
+
+/// A reflectance at one point of a surface: a model, scaled, over a diffuse base.
+#[derive(Clone, Debug)]
+pub struct PointReflectance {
+    model: Model,
+    scale: DVec3,
+    base: DVec3,
+}
+
+impl PointReflectance {
+    fn with(&self, wi: DVec3, wo: DVec3, value: DVec3) -> DVec3 {
+        let above = wi.z > 0.0 && wo.z > 0.0;
+        value * self.scale + if above { self.base / PI } else { DVec3::ZERO }
+    }
+}
+
+impl Reflectance for PointReflectance {
+    fn evaluate(&self, wi: DVec3, wo: DVec3) -> DVec3 {
+        self.with(wi, wo, self.model.evaluate(wi, wo))
+    }
+
+    fn isotropic(&self) -> bool {
+        self.model.isotropic()
+    }
+
+    fn mean_over_turns(&self, wi: DVec3, wo: DVec3) -> DVec3 {
+        self.with(wi, wo, self.model.mean_over_turns(wi, wo))
+    }
+}

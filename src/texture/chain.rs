@@ -1,0 +1,89 @@
+//! Mips.
+
+use crate::texture::{Format, Level, Texture};
+
+/// Linear from sRGB-encoded light, both in [0, 1] (IEC 61966-2-1).
+pub fn decode_srgb(encoded: f64) -> f64 {
+    if encoded <= 0.04045 { encoded / 12.92 } else { ((encoded + 0.055) / 1.055).powf(2.4) }
+}
+
+/// sRGB-encoded from linear light, both in [0, 1] (IEC 61966-2-1).
+pub fn encode_srgb(linear: f64) -> f64 {
+    if linear <= 0.003_130_8 { linear * 12.92 } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 }
+}
+
+/// A texture and its mips: each texel of a level is the average of the area that it covers of the level before, whose side
+/// need not be even. Averages are taken before they are rounded to the format.
+pub(super) fn chain<const N: usize>(format: Format, size: [u32; 2], source: impl Fn(usize) -> [f32; N]) -> Texture {
+    let texels = |size: [u32; 2], of: &dyn Fn(usize) -> [f32; N]| {
+        let count = size[0] as usize * size[1] as usize;
+        let mut out = Vec::with_capacity(count * format.bytes());
+        (0..count).for_each(|i| format.encode(&of(i), &mut out));
+        Level { size, texels: out }
+    };
+    let mut levels = vec![texels(size, &source)];
+    let mut known = [size[0], size[1]];
+    let mut before: Option<Vec<[f32; N]>> = None;
+    while known != [1, 1] {
+        let next = known.map(|side| (side / 2).max(1));
+        // Of the first level there is no copy beside the caller's.
+        let averages = match &before {
+            None => averages(known, next, &source),
+            Some(level) => averages(known, next, |i| level[i]),
+        };
+        levels.push(texels(next, &|i| averages[i]));
+        (known, before) = (next, Some(averages));
+    }
+    Texture { format, levels }
+}
+
+fn averages<const N: usize>(from: [u32; 2], to: [u32; 2], texel: impl Fn(usize) -> [f32; N]) -> Vec<[f32; N]> {
+    let (columns, rows) = (axis_weights(from[0], to[0]), axis_weights(from[1], to[1]));
+    let mut out = Vec::with_capacity(columns.len() * rows.len());
+    for row in &rows {
+        for column in &columns {
+            let mut sum = [0.0f64; N];
+            for (y, along_y) in row.iter() {
+                for (x, along_x) in column.iter() {
+                    let value = texel(y * from[0] as usize + x);
+                    for (sum, c) in sum.iter_mut().zip(value) {
+                        *sum += along_x * along_y * f64::from(c);
+                    }
+                }
+            }
+            out.push(sum.map(|c| c as f32));
+        }
+    }
+    out
+}
+
+/// Neighbours that a texel covers: the first, and the share of each.
+struct Shares {
+    first: usize,
+    shares: [f64; 3],
+    count: usize,
+}
+
+impl Shares {
+    fn iter(&self) -> impl Iterator<Item = (usize, f64)> + '_ {
+        self.shares.iter().take(self.count).enumerate().map(|(i, share)| (self.first + i, *share))
+    }
+}
+
+/// Of each of `to` texels along an axis, what it covers of the `from` of the level before: at most three, as `from` is
+/// `to`, `2 to` or `2 to + 1`.
+fn axis_weights(from: u32, to: u32) -> Vec<Shares> {
+    let (from, to) = (u64::from(from), u64::from(to));
+    let shares = |i: u64| {
+        // In units of 1/to of a texel: whole numbers.
+        let (start, end) = (i * from, (i + 1) * from);
+        let first = start / to;
+        let last = (end - 1) / to;
+        let mut shares = [0.0; 3];
+        for (share, texel) in shares.iter_mut().zip(first..=last) {
+            *share = (end.min((texel + 1) * to) - start.max(texel * to)) as f64 / from as f64;
+        }
+        Shares { first: first as usize, shares, count: (last - first + 1) as usize }
+    };
+    (0..to).map(shares).collect()
+}
