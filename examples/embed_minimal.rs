@@ -163,7 +163,8 @@ pub fn run(options: &Options) -> Result<Report, Box<dyn Error>> {
 
 /// The passes that read the G-buffer, compiled with this host's bridge.
 pub(crate) fn replace_modules(config: &mut Config) -> Result<(), Box<dyn Error>> {
-    let modules: [(&str, &[u8]); 4] = [
+    let modules: [(&str, &[u8]); 5] = [
+        ("filter.comp", include_bytes!("embed_minimal/spirv/filter.comp.spv")),
         ("curvature.comp", include_bytes!("embed_minimal/spirv/curvature.comp.spv")),
         ("classify.comp", include_bytes!("embed_minimal/spirv/classify.comp.spv")),
         ("shade.comp", include_bytes!("embed_minimal/spirv/shade.comp.spv")),

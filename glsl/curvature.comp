@@ -8,7 +8,13 @@ layout(local_size_x = 8, local_size_y = 8) in;
 
 layout(set = 2, binding = 1, rgba16f) uniform writeonly image2D curvature; // k1, k2 in 1/m, |k1| >= |k2|; positive is convex
 
+layout(set = 2, binding = 2) uniform sampler2D normals; // as the filter pass writes them
+
 const float LARGEST = 6e4; // 16-bit float
+
+vec3 normal(ivec2 p) {
+    return texelFetch(normals, p, 0).xyz;
+}
 
 vec3 position(ivec2 p) {
     return frame_ray(p) * gbuffer_depth(p);
@@ -24,7 +30,7 @@ bool differences(ivec2 p, ivec2 axis, uint object, float depth, float reach, out
     bool after = usable(p + axis, object, depth, reach), before = usable(p - axis, object, depth, reach);
     ivec2 a = after ? p + axis : p, b = before ? p - axis : p;
     dp = position(a) - position(b);
-    dn = gbuffer_normal(a) - gbuffer_normal(b);
+    dn = normal(a) - normal(b);
     return after || before;
 }
 
@@ -39,7 +45,7 @@ void main() {
     }
     uint object = gbuffer_object(p);
     float depth = gbuffer_depth(p);
-    vec3 n = gbuffer_normal(p);
+    vec3 n = normal(p);
     vec3 ray = frame_ray(p);
     float facing = max(abs(dot(n, normalize(ray))), 0.02);
     float footprint = depth * max(abs(frame.ray.x) * 2.0 / float(frame.extent.x), abs(frame.ray.y) * 2.0 / float(frame.extent.y));

@@ -4,6 +4,7 @@
 #include "frame.glsl"
 #include "gbuffer.glsl"
 #include "materials.glsl"
+#include "tangent.glsl"
 #include "environment.glsl"
 #include "lights.glsl"
 #include "sobol.glsl"
@@ -31,6 +32,9 @@ layout(set = 2, binding = 5, rgba32f) uniform writeonly image2D radiance;
 layout(set = 2, binding = 6, std430) readonly buffer Lights {
     LightRecord lights[]; // exact ones first
 };
+
+layout(set = 2, binding = 7) uniform sampler2D normals;  // as the filter pass writes them
+layout(set = 2, binding = 8) uniform usampler2D factors;
 
 layout(push_constant) uniform Push {
     uint brdf_samples;
@@ -64,6 +68,12 @@ Local local_frame(vec3 n, vec3 v) {
     f.y = cross(n, f.x);
     f.view = vec3(sqrt(max(1.0 - c * c, 0.0)), 0.0, c);
     return f;
+}
+
+// What turns local directions into the tangent frame, whose tangent and handedness t holds; without, the local frame stands for it.
+vec3 tangent_turn(Local f, vec4 t) {
+    vec2 at = vec2(dot(f.x, t.xyz), dot(f.x, cross(f.z, t.xyz)));
+    return t.w == 0.0 ? vec3(1.0, 0.0, 1.0) : vec3(normalize(at), t.w);
 }
 
 vec3 to_world(Local f, vec3 w) {
@@ -154,9 +164,11 @@ void main() {
     uint entry = list[index];
     ivec2 p = ivec2(entry & 0xffffu, entry >> 16);
     vec3 ray = frame_ray(p);
-    Local f = local_frame(gbuffer_normal(p), -normalize(ray));
+    vec4 normal = texelFetch(normals, p, 0);
+    Local f = local_frame(normal.xyz, -normalize(ray));
     vec3 at = frame.eye.xyz + ray * gbuffer_depth(p);
-    Material m = material_load(gbuffer_material(p), f.view.z);
+    Material m = material_load(gbuffer_material(p), f.view.z, tangent_turn(f, tangent_decode(normal.xyz, normal.w)),
+        factors_unpack(texelFetch(factors, p, 0)));
 
     uint seed = hash(entry ^ hash(frame.sampling.x ^ hash(frame.sampling.y)));
     vec3 sum = vec3(0.0);

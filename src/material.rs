@@ -147,7 +147,7 @@ fn unit(xy: DVec2) -> DVec3 {
 
 impl Model {
     /// The model's own parameter from a value of a roughness map.
-    fn roughness_from(&self, kind: Roughness, value: f64) -> f64 {
+    pub(crate) fn roughness_from(&self, kind: Roughness, value: f64) -> f64 {
         let value = value.max(0.0);
         let (alpha, concentration) = match kind {
             Roughness::Alpha => (value, 2.0 / (value * value)),

@@ -12,6 +12,8 @@ pub(crate) struct Plan {
     pub shading: [u32; 2],
     /// The renderer's own G-buffer: surface, ids, coordinate, derivative, depth.
     pub gbuffer: Option<[ImageDesc; 5]>,
+    pub normals: ImageDesc,
+    pub factors: ImageDesc,
     pub curvature: Option<ImageDesc>,
     pub radiance: ImageDesc,
     pub resolved: ImageDesc,
@@ -65,6 +67,8 @@ impl Plan {
                     image("depth", vk::Format::D32_SFLOAT, shading, vk::ImageUsageFlags::DEPTH_STENCIL_ATTACHMENT),
                 ]
             }),
+            normals: image("normals", vk::Format::R32G32B32A32_SFLOAT, shading, storage),
+            factors: image("factors", vk::Format::R32G32B32A32_UINT, shading, storage),
             curvature: config.curvature.then(|| image("curvature", vk::Format::R16G16B16A16_SFLOAT, shading, storage)),
             radiance: image("radiance", vk::Format::R32G32B32A32_SFLOAT, shading, storage),
             resolved: image("resolved", vk::Format::R32G32B32A32_SFLOAT, config.extent, storage),
@@ -72,7 +76,8 @@ impl Plan {
     }
 
     fn images(&self) -> impl Iterator<Item = &ImageDesc> {
-        self.gbuffer.iter().flatten().chain(&self.curvature).chain([&self.radiance, &self.resolved])
+        let all = [&self.normals, &self.factors, &self.radiance, &self.resolved];
+        self.gbuffer.iter().flatten().chain(&self.curvature).chain(all)
     }
 
     /// Bytes of the list of samples to shade.
@@ -124,6 +129,9 @@ pub fn memory_footprint(config: &Config) -> Footprint {
         bytes: config.frames_in_flight as u64 * size_of::<crate::pass::FrameUniform>() as u64,
     });
     rows.push(FootprintRow { name: "lights", bytes: config.frames_in_flight as u64 * LIGHT_BYTES });
+    if plan.gbuffer.is_some() {
+        rows.push(FootprintRow { name: "no tangent", bytes: crate::pass::gbuffer::NO_TANGENT.len() as u64 });
+    }
     Footprint { rows }
 }
 
@@ -139,8 +147,8 @@ mod tests {
         assert_eq!(list(&memory_footprint(&base)), Some(4 * pixels));
         let fine = Config { samples_per_side: 4, ..base.clone() };
         assert_eq!(list(&memory_footprint(&fine)), Some(16 * 4 * pixels));
-        // surface, coordinate, derivative, radiance 16 bytes; ids, depth, list 4; resolved 16
-        assert_eq!(memory_footprint(&base).total(), pixels * (4 * 16 + 3 * 4 + 16) + 16 + 2 * (144 + 256 * 64));
+        // surface, coordinate, derivative, normals, factors, radiance 16 bytes; ids, depth, list 4; resolved 16
+        assert_eq!(memory_footprint(&base).total(), pixels * (6 * 16 + 3 * 4 + 16) + 16 + 16 + 2 * (144 + 256 * 64));
     }
 
     #[test]

@@ -15,12 +15,12 @@ use crate::gpu::retire::{Build, Retired};
 use crate::gpu::sampler::Samplers;
 use crate::gpu::timer::{FrameTimings, GpuTimer};
 use crate::light;
+use crate::material::Material;
 use crate::pass::environment::{EnvironmentImages, EnvironmentUpload};
 use crate::pass::gbuffer::{self, GBuffer};
 use crate::pass::materials::{MaterialBridge, MaterialImages, MaterialsUpload};
-use crate::pass::{FrameUniform, PassContext, classify, curvature, resolve, shade, tonemap};
+use crate::pass::{FrameUniform, PassContext, classify, curvature, filter, resolve, shade, tonemap};
 use crate::plan::{Directions, LIGHT_BYTES};
-use crate::reflectance::Model;
 use crate::sampling::LatLong;
 use crate::targets::Targets;
 use ash::vk;
@@ -59,7 +59,8 @@ pub struct Renderer {
     passes: Passes,
     targets: Targets,
     environment: Option<EnvironmentImages>,
-    materials: Option<MaterialImages>,
+    /// With the pass that is compiled for their maps.
+    materials: Option<(MaterialImages, filter::Filter)>,
     undestroyed: Undestroyed,
 }
 
@@ -137,7 +138,7 @@ impl Renderer {
         Ok(bag)
     }
 
-    /// Replaces the materials: builds their importance tables and records the uploads. Draws and G-buffers name them by
+    /// Replaces the materials: builds their importance tables, compiles the pass that reads their maps and records the uploads. Draws and G-buffers name them by
     /// index. The bag holds the staging memory and the former materials.
     ///
     /// # Errors
@@ -148,17 +149,24 @@ impl Renderer {
     pub unsafe fn record_materials(
         &mut self,
         cmd: vk::CommandBuffer,
-        models: &[Model],
+        materials: &[Material],
         memory: &mut dyn HostAllocator,
     ) -> Result<Retired> {
-        let upload = Build::run(&self.cx, memory, |build| MaterialsUpload::new(build, models))?;
+        let bridge = BridgeLayouts { gbuffer: layout(&self.passes.gbuffer, &self.config), materials: self.bridge.layout };
+        let (modules, slots) = (&self.config.modules, self.config.frames_in_flight);
+        let (upload, filter) = Build::run(&self.cx, memory, |build| {
+            let upload = MaterialsUpload::new(build, materials)?;
+            let filter = filter::Filter::new(&mut PassContext { build, modules, bridge, slots }, upload.uses())?;
+            Ok((upload, filter))
+        })?;
         let mut bag = Retired::default();
         let mut rec = Recorder::new(&self.cx, cmd, 0, &mut self.states, None);
         rec.begin(crate::pass::materials::NAME);
         let fresh = upload.record(&mut rec, &mut bag);
         rec.end();
-        if let Some(former) = self.materials.replace(fresh) {
+        if let Some((former, pass)) = self.materials.replace((fresh, filter)) {
             former.retire(&mut self.states, &mut bag);
+            pass.retire(&mut bag);
         }
         Ok(bag)
     }
@@ -176,7 +184,7 @@ impl Renderer {
     pub unsafe fn record(&mut self, cmd: vk::CommandBuffer, inputs: &FrameInputs<'_>) -> Result<()> {
         inputs.check(&self.config, self.targets.plan.shading)?;
         let before = "record_environment and record_materials";
-        let (Some(environment), Some(materials)) = (&self.environment, &self.materials) else {
+        let (Some(environment), Some((materials, filter))) = (&self.environment, &self.materials) else {
             return Err(Error::CallOrder { called: "record", before });
         };
         if let GBufferInput::Draws(draws) = inputs.gbuffer {
@@ -208,8 +216,12 @@ impl Renderer {
             _ => return Err(Error::invalid("gbuffer", format!("as {:?}", self.config.gbuffer), "the other kind")),
         };
         let bridge = BridgeSets { gbuffer, materials: self.bridge.write(rec, materials, samplers) };
+
+        // 2  Their materials at the pixel's scale.
+        let (normals, factors) = (&targets.normals, &targets.factors);
+        filter.record(rec, &filter::Io { frame, bridge, samplers, maps: &materials.maps, normals, factors });
         if let (Some(pass), Some(curvature)) = (&passes.curvature, &targets.curvature) {
-            pass.record(rec, &curvature::Io { frame, bridge, curvature });
+            pass.record(rec, &curvature::Io { frame, bridge, samplers, normals, curvature });
         }
 
         // 6  Which samples to shade.
@@ -225,6 +237,8 @@ impl Renderer {
                 frame,
                 bridge,
                 samplers,
+                normals,
+                factors,
                 environment,
                 materials,
                 arguments,
@@ -285,8 +299,9 @@ impl Renderer {
         if let Some(environment) = self.environment {
             environment.retire(&mut self.states, &mut bag);
         }
-        if let Some(materials) = self.materials {
+        if let Some((materials, filter)) = self.materials {
             materials.retire(&mut self.states, &mut bag);
+            filter.retire(&mut bag);
         }
         self.targets.retire(&mut self.states, &mut bag);
         self.passes.retire(&mut bag);
@@ -319,7 +334,7 @@ impl Renderer {
         probe: &crate::pass::probe::Probe,
         (input, count, output): (&Buffer, u32, &Buffer),
     ) -> Result<()> {
-        let (Some(environment), Some(materials)) = (&self.environment, &self.materials) else {
+        let (Some(environment), Some((materials, _))) = (&self.environment, &self.materials) else {
             return Err(Error::CallOrder { called: "record_probe", before: "record_environment and record_materials" });
         };
         let uniform = inputs.uniform(&self.config, self.targets.plan.shading, [0, 0]);
@@ -365,11 +380,7 @@ impl Passes {
             GBufferSource::Draws => Some(GBuffer::new(&mut p)?),
             GBufferSource::Host { .. } => None,
         };
-        p.bridge.gbuffer = match (&gbuffer, config.gbuffer) {
-            (_, GBufferSource::Host { layout }) => layout,
-            (Some(own), GBufferSource::Draws) => own.layout,
-            (None, GBufferSource::Draws) => vk::DescriptorSetLayout::null(),
-        };
+        p.bridge.gbuffer = layout(&gbuffer, config);
         Ok(Self {
             gbuffer,
             curvature: config.curvature.then(|| curvature::Curvature::new(&mut p)).transpose()?,
@@ -391,5 +402,14 @@ impl Passes {
         self.shade.retire(bag);
         self.resolve.retire(bag);
         self.tonemap.retire(bag);
+    }
+}
+
+/// Layout of set 0: our own G-buffer's or the host's.
+fn layout(own: &Option<GBuffer>, config: &Config) -> vk::DescriptorSetLayout {
+    match (own, config.gbuffer) {
+        (_, GBufferSource::Host { layout }) => layout,
+        (Some(own), GBufferSource::Draws) => own.layout,
+        (None, GBufferSource::Draws) => vk::DescriptorSetLayout::null(),
     }
 }

@@ -14,6 +14,8 @@ use ash::vk;
 pub(crate) struct Targets {
     pub plan: Plan,
     pub gbuffer: Option<GBufferImages>,
+    pub normals: Image,
+    pub factors: Image,
     pub curvature: Option<Image>,
     pub radiance: Image,
     pub resolved: Image,
@@ -38,6 +40,8 @@ impl Targets {
             | vk::BufferUsageFlags::TRANSFER_SRC;
         Ok(Self {
             gbuffer: plan.gbuffer.map(|images| GBufferImages::new(build, images)).transpose()?,
+            normals: Image::new(build, plan.normals)?,
+            factors: Image::new(build, plan.factors)?,
             curvature: plan.curvature.map(|desc| Image::new(build, desc)).transpose()?,
             radiance: Image::new(build, plan.radiance)?,
             resolved: Image::new(build, plan.resolved)?,
@@ -51,13 +55,18 @@ impl Targets {
     #[cfg(feature = "offline")]
     pub fn image(&self, name: &str) -> Option<&Image> {
         let gbuffer = self.gbuffer.as_ref().map(GBufferImages::colors);
-        let all = gbuffer.into_iter().flatten().chain(&self.curvature).chain([&self.radiance, &self.resolved]);
+        let all = gbuffer.into_iter().flatten().chain(&self.curvature).chain([
+            &self.normals,
+            &self.factors,
+            &self.radiance,
+            &self.resolved,
+        ]);
         all.into_iter().find(|image| image.desc.name == name)
     }
 
     pub fn retire(self, states: &mut States, bag: &mut Retired) {
         let images = self.gbuffer.into_iter().flat_map(GBufferImages::into_images);
-        for image in images.chain(self.curvature).chain([self.radiance, self.resolved]) {
+        for image in images.chain(self.curvature).chain([self.normals, self.factors, self.radiance, self.resolved]) {
             states.forget(image.handle);
             image.retire(bag);
         }

@@ -52,12 +52,12 @@ fn whichever_request_fails_nothing_is_kept() {
         rig.try_submit(|cmd, _, memory| unsafe { renderer.record_environment(cmd, &sky(), memory) })
     });
     assert_eq!(requests, 4, "two images, two staging buffers");
-    let models = [grey(), table];
+    let models = [grey().into(), table.into()];
     let ((), requests) = until_it_succeeds(&mut rig, |rig| {
         // SAFETY: the command buffer is recording.
         rig.try_submit(|cmd, _, memory| unsafe { renderer.record_materials(cmd, &models, memory) })
     });
-    assert_eq!(requests, 8, "three images and a buffer, each with staging");
+    assert_eq!(requests, 12, "four images and two buffers, each with staging");
 
     let draws = [rig.draw(&builtin::mesh("sphere", 16).unwrap(), 0)];
     let image = rig.frame(&mut renderer, &draws);
@@ -68,7 +68,7 @@ fn whichever_request_fails_nothing_is_kept() {
         }
         result
     });
-    assert_eq!(requests, memory_footprint(&config).rows.len() - 2, "all but the frame and the lights");
+    assert_eq!(requests, memory_footprint(&config).rows.len() - 3, "all but the frame, the lights and the stand-in for tangents");
     // SAFETY: every submission is waited for.
     unsafe { bag.free(&rig.gpu.device, &mut rig.memory) };
 
@@ -96,7 +96,8 @@ fn a_failed_replacement_changes_nothing() {
         assert!(matches!(result, Err(Error::Allocation { .. })), "{result:?}");
         rig.memory.fail_at = Some(rig.memory.requests + k);
         // SAFETY: as above.
-        let result = rig.try_submit(|cmd, _, memory| unsafe { renderer.record_materials(cmd, &[grey(), grey()], memory) });
+        let result =
+            rig.try_submit(|cmd, _, memory| unsafe { renderer.record_materials(cmd, &[grey().into(), grey().into()], memory) });
         assert!(matches!(result, Err(Error::Allocation { .. })), "{result:?}");
         rig.memory.fail_at = Some(rig.memory.requests + k);
         assert!(renderer.resize([5, 5], &mut rig.memory).is_err());
@@ -119,7 +120,7 @@ fn a_whole_life_gives_everything_back() {
             // SAFETY: the command buffer is recording.
             let mut bag = unsafe { renderer.record_environment(cmd, &sky(), memory) }.unwrap();
             // SAFETY: as above.
-            bag.append(unsafe { renderer.record_materials(cmd, &[grey(), grey()], memory) }.unwrap());
+            bag.append(unsafe { renderer.record_materials(cmd, &[grey().into(), grey().into()], memory) }.unwrap());
             ((), bag)
         });
         rig.frame(&mut renderer, &draws);

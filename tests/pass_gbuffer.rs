@@ -10,6 +10,7 @@ use passband::offline::builtin;
 use passband::offline::mesh::Mesh;
 use passband::offline::session::Session;
 use passband::offline::world::{Camera, Material, Object, World};
+use passband::reflectance::frame;
 use std::collections::HashSet;
 use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
@@ -25,6 +26,8 @@ struct Sample {
     object: u32,
     material: u32,
     uv: DVec2,
+    /// Tangent and handedness.
+    tangent: Option<(DVec3, f64)>,
     /// d(uv)/dx, d(uv)/dy
     footprint: DVec4,
     curvature: DVec2,
@@ -59,7 +62,7 @@ fn render(camera: Camera, objects: Vec<(Mesh, Mat4, usize)>) -> Vec<Sample> {
     let mut read = |name: &str| session.image(name).unwrap().0;
     let surface: Vec<[f32; 4]> = bytemuck::pod_collect_to_vec(&read("surface"));
     let ids: Vec<u32> = bytemuck::pod_collect_to_vec(&read("ids"));
-    let coordinate: Vec<[f32; 2]> = bytemuck::pod_collect_to_vec(&read("coordinate"));
+    let coordinate: Vec<[f32; 4]> = bytemuck::pod_collect_to_vec(&read("coordinate"));
     let derivative: Vec<[f32; 4]> = bytemuck::pod_collect_to_vec(&read("derivative"));
     let curvature: Vec<[f16; 4]> = bytemuck::pod_collect_to_vec(&read("curvature"));
     assert_clean(&session.messages());
@@ -74,7 +77,8 @@ fn render(camera: Camera, objects: Vec<(Mesh, Mat4, usize)>) -> Vec<Sample> {
             depth,
             object: (ids[i] - 1) >> 16,
             material: (ids[i] - 1) & 0xffff,
-            uv: DVec2::from(coordinate[i].map(f64::from)),
+            uv: dvec2(coordinate[i][0].into(), coordinate[i][1].into()),
+            tangent: frame::decode(dvec3(x, y, z), coordinate[i][2].into()),
             footprint: DVec4::from(derivative[i].map(f64::from)),
             curvature: dvec2(curvature[i][0].to_f64(), curvature[i][1].to_f64()),
             position: camera.position + ray * (depth / ray.dot(forward)),
@@ -275,4 +279,29 @@ fn neighbours_of_another_object_are_not_used() {
     assert_eq!(one.len(), two.len());
     let bent = one.iter().filter(|s| s.curvature.x > 5.0).count();
     assert!(bent > 30, "{bent} samples");
+}
+
+#[test]
+fn tangents_follow_growing_u_under_every_transform() {
+    let mut mesh = builtin::mesh("sphere", 1024).unwrap();
+    mesh.compute_tangents();
+    // Uneven and mirrored: a tangent is transformed as a difference of points is, and a mirror image swaps the bitangent's side.
+    let uneven = Mat4::from_euler(EulerRot::XYZ, 0.4, 0.7, 0.2) * Mat4::from_scale(vec3(0.9, 0.5, -0.7));
+    for (transform, handedness) in [(Mat4::IDENTITY, 1.0), (uneven, -1.0)] {
+        let samples = render(camera(dvec3(0.4, 0.5, 3.0)), vec![(mesh.clone(), transform, 0)]);
+        let back = transform.as_dmat4().inverse();
+        // Away from the poles and from the silhouette, where facets are seen from the side.
+        let inner = samples.iter().filter(|s| s.facing > 0.3 && back.transform_point3(s.position).y.abs() < 0.8);
+        let error = worst(inner, 500, |s| {
+            let p = back.transform_point3(s.position);
+            let along = transform.as_dmat4().transform_vector3(dvec3(p.z, 0.0, -p.x));
+            let expected = (along - s.normal * s.normal.dot(along)).normalize();
+            let (tangent, side) = s.tangent.unwrap();
+            if side == handedness { tangent.distance(expected) } else { 2.0 }
+        });
+        // Facets: a vertex's tangent is the mean of those of its triangles.
+        assert!(error < 0.01, "tangent {error}");
+    }
+    let plain = render(camera(dvec3(0.4, 0.5, 3.0)), vec![(builtin::mesh("sphere", 64).unwrap(), Mat4::IDENTITY, 0)]);
+    assert!(plain.iter().all(|s| s.tangent.is_none()));
 }

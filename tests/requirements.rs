@@ -9,7 +9,7 @@ use passband::offline::builtin;
 use passband::reflectance::{Ggx, Model};
 use passband::sampling::LatLong;
 use passband::{
-    Config, Draw, EnvironmentUse, Error, FrameInputs, GBufferInput, GBufferSource, Host, ImageRef, Output, Renderer,
+    Config, Draw, EnvironmentUse, Error, FrameInputs, GBufferInput, GBufferSource, Host, ImageRef, Material, Output, Renderer,
     Requirements, Retired, Transfer, View,
 };
 
@@ -219,7 +219,7 @@ fn frames_come_after_environment_and_materials() {
             assert!(matches!(renderer.record(cmd, &inputs), Err(Error::CallOrder { called: "record", .. })));
             bag.append(renderer.record_environment(cmd, &white, memory).unwrap());
             assert!(matches!(renderer.record(cmd, &inputs), Err(Error::CallOrder { called: "record", .. })));
-            bag.append(renderer.record_materials(cmd, &[grey()], memory).unwrap());
+            bag.append(renderer.record_materials(cmd, &[grey().into()], memory).unwrap());
             renderer.record(cmd, &inputs).unwrap();
         }
         ((), bag)
@@ -244,9 +244,10 @@ fn impossible_materials_and_environments_are_refused() {
     let blinding = LatLong::new(1, 1, vec![[f32::MAX; 3]]).unwrap();
     let live = rig.memory.live.len();
     rig.submit(|cmd, _, memory| {
-        for (models, field) in &wrong {
+        for (models, field) in wrong {
+            let materials: Vec<_> = models.into_iter().map(Material::from).collect();
             // SAFETY: the command buffer is recording.
-            assert_invalid(unsafe { renderer.record_materials(cmd, models, memory) }, field);
+            assert_invalid(unsafe { renderer.record_materials(cmd, &materials, memory) }, field);
         }
         // SAFETY: as above.
         assert_invalid(unsafe { renderer.record_environment(cmd, &blinding, memory) }, "environment radiance");

@@ -3,7 +3,7 @@
 use glam::{DVec3, Mat4, Vec3, Vec4, dvec3, vec3};
 use passband::reflectance::{Ggx, Model};
 use passband::sampling::{LatLong, latlong};
-use passband::{Error, View};
+use passband::{Error, Material, View};
 
 /// Near plane in metres; `HOST_NEAR` of `bridge/gbuffer.glsl`.
 pub const NEAR: f32 = 0.1;
@@ -56,8 +56,8 @@ pub fn objects() -> [Object; 2] {
 }
 
 /// By the objects' material numbers.
-pub fn materials() -> [Model; 2] {
-    let ggx = |alpha, f0, albedo| Model::Ggx(Ggx { alpha, f0, albedo });
+pub fn materials() -> [Material; 2] {
+    let ggx = |alpha, f0, albedo| Material::from(Model::Ggx(Ggx { alpha, f0, albedo }));
     [
         ggx(0.3, dvec3(0.9, 0.6, 0.3), DVec3::ZERO), //
         ggx(0.5, DVec3::splat(0.04), dvec3(0.3, 0.35, 0.4)),

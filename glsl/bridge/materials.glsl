@@ -7,6 +7,8 @@
 #include "ggx.glsl"
 #include "blinn_phong.glsl"
 #include "cavity.glsl"
+#include "vmf.glsl"
+#include "factors.glsl"
 
 const uint REFLECTANCE_TABLE = 0u;
 const uint REFLECTANCE_GGX = 1u;
@@ -16,6 +18,8 @@ const uint REFLECTANCE_TURNED = 4u;
 
 // Table resolution (MERL) and importance table layout (src/reflectance/importance.rs).
 const vec3 TABLE_SIZE = vec3(180.0, 90.0, 90.0); // phi_d, theta_d, theta_h
+// With less, a mixture of lobes would face away from its normal.
+const float LEAST_PROJECTED_AREA = 0.05;
 const uint IMPORTANCE_ANGLES = 64u;
 const uint IMPORTANCE_ROWS = 64u;
 const uint IMPORTANCE_COLUMNS = 16u;
@@ -26,13 +30,14 @@ const float TABLE_BORDER = 0.5 + 1.0 / 8192.0;
 
 // By kind:           table               GGX              Blinn-Phong         vMF                turned tables
 //   kind.yz          place in the atlas                                       first lobe, lobes  first table, tables
-//   f0               -                   F0; alpha        specular; exponent  1                  x: tables per radian
-//   albedo           w: scale            albedo           albedo              0                  w: scale
-// A lobe is a record of its own: mean direction and concentration in f0, its density at the centre in albedo.x.
+//   f0               1; -                F0; alpha        specular; exponent  1; mean z of lobes 1; tables per radian
+//   albedo           w: scale            albedo           albedo              1                  w: scale
+// A lobe is a record of its own: mean direction and concentration in f0, its density at the centre and its weight in albedo.xy.
 struct MaterialRecord {
-    uvec4 kind;  // x: kind of reflectance
+    uvec4 kind;      // x: kind of reflectance
     vec4 f0;
     vec4 albedo;
+    vec4 importance; // first of its importance tables; the number of the last step; log2 of the roughness of the first; steps per log2
 };
 
 layout(set = 1, binding = 0, std430) readonly buffer Materials {
@@ -48,23 +53,41 @@ struct Material {
     ivec2 cell;      // first texel of its importance cells for this view angle
     vec2 density;    // first texel of its density tile
     vec2 table;      // first texel of its table in y, z
-    vec2 turn;       // cosine and sine of the angle from the tangent frame's x axis to the local one
+    vec3 turn;       // cosine and sine of the angle from the tangent frame's x axis to the local one; handedness
+    vec2 lobe;       // concentration and density at the centre of a lobe of weight 1, where a map replaces the lobes' own
 };
 
-Material material_load(uint id, float cos_o, vec2 turn) {
+Material material_load(uint id, float cos_o, vec3 turn, Factors factors) {
     Material m;
     m.record = materials[id];
+    uint kind = m.record.kind.x;
+    bool table = kind == REFLECTANCE_TABLE || kind == REFLECTANCE_TURNED;
+    bool vmf = kind == REFLECTANCE_VMF;
+    bool rough = factors.roughness != NO_ROUGHNESS;
+    vec3 f0 = m.record.f0.rgb * (table ? factors.albedo : factors.specular);
+    m.record.f0.rgb = table || vmf ? f0 : min(f0, 1.0);
+    m.record.albedo.rgb = min(m.record.albedo.rgb * factors.albedo, 1.0);
+    float facing = vmf_mean_cosine(factors.roughness) * m.record.f0.w;
+    m.lobe = rough ? vec2(factors.roughness, vmf_normalisation(factors.roughness) / max(facing, LEAST_PROJECTED_AREA)) : vec2(0.0);
+    m.record.f0.w = rough && !table && !vmf ? factors.roughness : m.record.f0.w;
+
     uint angle = min(uint(acos_positive(clamp(cos_o, 0.0, 1.0)) * (2.0 * INV_PI * float(IMPORTANCE_ANGLES))), IMPORTANCE_ANGLES - 1u);
-    m.cell = ivec2(angle * IMPORTANCE_COLUMNS, id * IMPORTANCE_ROWS);
-    m.density = vec2(angle, id) * DENSITY_SIZE;
+    vec4 steps = m.record.importance;
+    float step_number = rough ? round((log2(max(factors.roughness, 1e-9)) - steps.z) * steps.w) : 0.0;
+    uint tile = uint(steps.x + clamp(step_number, 0.0, steps.y));
+    uvec2 at = uvec2((tile >> 6) * IMPORTANCE_ANGLES + angle, tile & 63u);
+    m.cell = ivec2(at * uvec2(IMPORTANCE_COLUMNS, IMPORTANCE_ROWS));
+    m.density = vec2(at) * DENSITY_SIZE;
     m.table = vec2(m.record.kind.yz) * TABLE_SIZE.yz;
     m.turn = turn;
     return m;
 }
 
-// For surfaces without tangents: the local frame stands for the tangent frame.
+// For surfaces without maps and tangents: the local frame stands for the tangent frame.
 Material material_load(uint id, float cos_o) {
-    return material_load(id, cos_o, vec2(1.0, 0.0));
+    Factors factors = NO_FACTORS;
+    factors.albedo = materials[id].kind.x == REFLECTANCE_VMF ? vec3(0.0) : factors.albedo;
+    return material_load(id, cos_o, vec3(1.0, 0.0, 1.0), factors);
 }
 
 // A table, or tables over the half vector's azimuth (src/reflectance/turned.rs) of which two neighbours are mixed; h is the half
@@ -80,7 +103,7 @@ vec3 material_tables(Material m, vec3 wi, vec3 wo, vec3 h, vec3 t) {
     // In floating point, as the reference driver divides integers one by one: numbers are small enough to be exact.
     float count = float(m.record.kind.z);
     float columns = round(size.x / TABLE_SIZE.y);
-    float at = turned ? atan_full(t.y, t.x) * m.record.f0.x : 0.0;
+    float at = turned ? atan_full(t.y, t.x) * m.record.f0.w : 0.0;
     float node = floor(at);
     float weight = at - node;
     vec2 table = m.table;
@@ -97,7 +120,7 @@ vec3 material_tables(Material m, vec3 wi, vec3 wo, vec3 h, vec3 t) {
         }
         node += 1.0;
     }
-    return sum * m.record.albedo.a;
+    return sum * m.record.f0.rgb * m.record.albedo.a;
 }
 
 // Density of normals in 1/sr of the two kinds with V-cavity masking: cosine-power (src/reflectance/blinn_phong.rs) and a mixture
@@ -110,8 +133,10 @@ float material_distribution(Material m, vec3 h, vec3 t) {
         // Without lobes of its own, a record stands in, unused.
         MaterialRecord lobe = materials[vmf ? m.record.kind.y + i : 0u];
         vec3 d = t - lobe.f0.xyz;
-        float exponent = vmf ? -0.5 * lobe.f0.w * dot(d, d) : blinn_phong_exponent(m.record.f0.a, h);
-        sum += (vmf ? lobe.albedo.x : blinn_phong_peak(m.record.f0.a)) * exp(exponent);
+        bool own = m.lobe.y == 0.0;
+        float exponent = vmf ? -0.5 * (own ? lobe.f0.w : m.lobe.x) * dot(d, d) : blinn_phong_exponent(m.record.f0.a, h);
+        float peak = own ? lobe.albedo.x : lobe.albedo.y * m.lobe.y;
+        sum += (vmf ? peak : blinn_phong_peak(m.record.f0.a)) * exp(exponent);
     }
     return sum;
 }
@@ -120,7 +145,7 @@ float material_distribution(Material m, vec3 h, vec3 t) {
 // the reference driver runs all branches.
 vec3 material_evaluate(Material m, vec3 wi, vec3 wo, vec3 h) {
     uint kind = m.record.kind.x;
-    vec3 t = vec3(m.turn.x * h.x - m.turn.y * h.y, m.turn.y * h.x + m.turn.x * h.y, h.z);
+    vec3 t = vec3(m.turn.x * h.x - m.turn.y * h.y, (m.turn.y * h.x + m.turn.x * h.y) * m.turn.z, h.z);
     vec3 value;
     if (kind == REFLECTANCE_TABLE || kind == REFLECTANCE_TURNED) {
         value = material_tables(m, wi, wo, h, t);

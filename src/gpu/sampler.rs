@@ -9,16 +9,19 @@ use ash::vk;
 pub(crate) struct Samplers {
     pub nearest: vk::Sampler,
     pub linear: vk::Sampler,
+    /// Linear within and between levels, wrapping in both coordinates.
+    pub tiled: vk::Sampler,
 }
 
 impl Samplers {
     pub fn new(build: &mut Build<'_>) -> Result<Self> {
-        let mut make = |filter, name: &str| -> Result<vk::Sampler> {
+        let mut make = |filter, vertical, mipmap, name: &str| -> Result<vk::Sampler> {
             let info = vk::SamplerCreateInfo::default()
                 .mag_filter(filter)
                 .min_filter(filter)
+                .mipmap_mode(mipmap)
                 .address_mode_u(vk::SamplerAddressMode::REPEAT)
-                .address_mode_v(vk::SamplerAddressMode::CLAMP_TO_EDGE)
+                .address_mode_v(vertical)
                 .address_mode_w(vk::SamplerAddressMode::CLAMP_TO_EDGE)
                 .max_lod(vk::LOD_CLAMP_NONE);
             // SAFETY: the device is alive.
@@ -26,11 +29,18 @@ impl Samplers {
             build.cx.name(sampler, name);
             Ok(build.track(sampler, Handle::Sampler))
         };
-        Ok(Self { nearest: make(vk::Filter::NEAREST, "nearest")?, linear: make(vk::Filter::LINEAR, "linear")? })
+        let (clamp, repeat) = (vk::SamplerAddressMode::CLAMP_TO_EDGE, vk::SamplerAddressMode::REPEAT);
+        let (one, between) = (vk::SamplerMipmapMode::NEAREST, vk::SamplerMipmapMode::LINEAR);
+        Ok(Self {
+            nearest: make(vk::Filter::NEAREST, clamp, one, "nearest")?,
+            linear: make(vk::Filter::LINEAR, clamp, one, "linear")?,
+            tiled: make(vk::Filter::LINEAR, repeat, between, "tiled")?,
+        })
     }
 
     pub fn retire(self, bag: &mut Retired) {
         bag.push(Handle::Sampler(self.nearest));
         bag.push(Handle::Sampler(self.linear));
+        bag.push(Handle::Sampler(self.tiled));
     }
 }

@@ -93,9 +93,9 @@ impl Session {
         setup.push(("pipelines", milliseconds(clock)));
 
         let clock = Instant::now();
-        let models: Vec<_> = world.materials.iter().map(|m| m.model.clone()).collect();
+        let materials: Vec<_> = world.materials.iter().map(|m| crate::Material::from(m.model.clone())).collect();
         // SAFETY: the command buffer is recording and submitted at once.
-        headless.submit(|cmd, memory| Ok(unsafe { renderer.record_materials(cmd, &models, memory) }?))?;
+        headless.submit(|cmd, memory| Ok(unsafe { renderer.record_materials(cmd, &materials, memory) }?))?;
         setup.push((crate::pass::materials::NAME, milliseconds(clock)));
 
         let clock = Instant::now();

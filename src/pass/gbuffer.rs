@@ -23,7 +23,8 @@ pub const BRIDGE: [vk::DescriptorType; 4] = [vk::DescriptorType::COMBINED_IMAGE_
 const COLORS: [vk::Format; 4] =
     [vk::Format::R32G32B32A32_SFLOAT, vk::Format::R32_UINT, vk::Format::R32G32B32A32_SFLOAT, vk::Format::R32G32B32A32_SFLOAT];
 const DEPTH: vk::Format = vk::Format::D32_SFLOAT;
-const NO_TANGENT: [u8; 16] = [0; 16];
+/// Contents of the buffer that stands in for missing tangents.
+pub(crate) const NO_TANGENT: [u8; 16] = [0; 16];
 
 #[repr(C)]
 #[derive(Clone, Copy, Pod, Zeroable)]

@@ -9,7 +9,10 @@ use crate::gpu::recorder::{Recorder, States};
 use crate::gpu::retire::{Build, Handle, Retired};
 use crate::gpu::sampler::Samplers;
 use crate::gpu::upload::{BufferUpload, ImageUpload};
+use crate::material::Material;
+use crate::pass::maps::{MapImages, MapsUpload, Uses};
 use crate::reflectance::importance::{COLUMNS, DENSITY_COLUMNS, DENSITY_ROWS, ImportanceTable, ROWS, VIEW_ANGLES};
+use crate::reflectance::ladder::Ladder;
 use crate::reflectance::merl::{PHI_DIFF, THETA_DIFF, THETA_HALF};
 use crate::reflectance::{Lobe, MerlTable, Model};
 use ash::vk;
@@ -29,8 +32,11 @@ pub const BRIDGE: [vk::DescriptorType; 4] = [
     vk::DescriptorType::COMBINED_IMAGE_SAMPLER,
 ];
 
-/// Materials that fit the importance atlas on every device (4096 rows).
+/// Materials of a frame.
 pub const MAX_MATERIALS: usize = 64;
+
+/// Tables one below the other in the importance atlas: on every device, images may have 4096 rows.
+const TILES_A_COLUMN: usize = 64;
 
 /// Mirrors `MaterialRecord` in `glsl/bridge/materials.glsl`.
 #[repr(C)]
@@ -39,6 +45,7 @@ struct Record {
     kind: [u32; 4],
     f0: [f32; 4],
     albedo: [f32; 4],
+    importance: [f32; 4],
 }
 
 /// What the shaders read.
@@ -47,6 +54,7 @@ pub(crate) struct MaterialImages {
     tables: Image,
     importance: Image,
     density: Image,
+    pub maps: MapImages,
 }
 
 /// Created and filled, not yet recorded.
@@ -55,6 +63,7 @@ pub(crate) struct MaterialsUpload {
     tables: ImageUpload,
     importance: ImageUpload,
     density: ImageUpload,
+    maps: MapsUpload,
 }
 
 /// Where table number `i` of `count` stands in the atlas, and the atlas's size, in tables along theta_d and theta_h: as square
@@ -75,10 +84,10 @@ struct Tables<'a> {
 }
 
 impl<'a> Tables<'a> {
-    fn of(models: &'a [Model]) -> Self {
+    fn of(materials: &'a [Material]) -> Self {
         let mut tables = Self { all: Vec::new(), slots: Vec::new() };
         let mut known: Vec<(*const u8, usize)> = Vec::new();
-        for model in models {
+        for Material { model, .. } in materials {
             let (key, nodes): (*const u8, Vec<&MerlTable>) = match model {
                 Model::Table(table) => (Arc::as_ptr(table).cast(), vec![table]),
                 Model::Turned(turned) => (Arc::as_ptr(turned).cast(), turned.nodes().iter().map(Arc::as_ref).collect()),
@@ -98,38 +107,39 @@ impl<'a> Tables<'a> {
     }
 }
 
-/// The records of `models`, and behind them those of vMF lobes; `columns` is the width of the atlas in tables.
-fn records(models: &[Model], tables: &Tables<'_>, columns: u32) -> Vec<Record> {
+/// The records of `materials`, and behind them those of vMF lobes; `columns` is the width of the atlas in tables.
+fn records(materials: &[Material], tables: &Tables<'_>, importance: &[[f32; 4]], columns: u32) -> Vec<Record> {
     let with = |v: DVec3, w: f64| v.extend(w).as_vec4().to_array();
     let mut lobes = Vec::new();
-    let mut records: Vec<_> = models
+    let mut records: Vec<_> = materials
         .iter()
         .zip(&tables.slots)
-        .map(|(model, &slot)| {
+        .zip(importance)
+        .map(|((Material { model, .. }, &slot), &importance)| {
             let scale = tables.all.get(slot).map_or(1.0, |t| t.1);
             let slot = slot as u32;
+            let record = |kind, f0, albedo| Record { kind, f0, albedo, importance };
             match model {
-                Model::Table(_) => {
-                    let kind = [0, slot % columns, slot / columns, 0];
-                    Record { kind, f0: [0.0; 4], albedo: [0.0, 0.0, 0.0, scale] }
-                }
-                Model::Ggx(g) => Record { kind: [1, 0, 0, 0], f0: with(g.f0, g.alpha), albedo: with(g.albedo, 1.0) },
-                Model::BlinnPhong(b) => {
-                    Record { kind: [2, 0, 0, 0], f0: with(b.specular, b.exponent), albedo: with(b.albedo, 1.0) }
-                }
+                Model::Table(_) => record([0, slot % columns, slot / columns, 0], [1.0; 4], [1.0, 1.0, 1.0, scale]),
+                Model::Ggx(g) => record([1, 0, 0, 0], with(g.f0, g.alpha), with(g.albedo, 1.0)),
+                Model::BlinnPhong(b) => record([2, 0, 0, 0], with(b.specular, b.exponent), with(b.albedo, 1.0)),
                 Model::Vmf(vmf) => {
-                    let first = models.len() + lobes.len();
+                    let first = materials.len() + lobes.len();
+                    let weight: f64 = vmf.lobes().iter().map(|l| l.weight).sum();
+                    let facing: f64 = vmf.lobes().iter().map(|l| l.weight * l.mu.z).sum();
                     let lobe = |(l, peak): (&Lobe, &f64)| Record {
                         kind: [0; 4],
                         f0: with(l.mu, l.kappa),
-                        albedo: [*peak as f32, 0.0, 0.0, 0.0],
+                        albedo: [*peak as f32, l.weight as f32, 0.0, 0.0],
+                        importance: [0.0; 4],
                     };
                     lobes.extend(vmf.lobes().iter().zip(vmf.peaks()).map(lobe));
-                    Record { kind: [3, first as u32, vmf.lobes().len() as u32, 0], f0: [1.0; 4], albedo: [0.0; 4] }
+                    let kind = [3, first as u32, vmf.lobes().len() as u32, 0];
+                    record(kind, with(DVec3::ONE, facing / weight), [1.0; 4])
                 }
                 Model::Turned(turned) => {
                     let kind = [4, slot, turned.nodes().len() as u32, 0];
-                    Record { kind, f0: [turned.nodes_per_radian() as f32, 0.0, 0.0, 0.0], albedo: [0.0, 0.0, 0.0, scale] }
+                    record(kind, with(DVec3::ONE, turned.nodes_per_radian()), [1.0, 1.0, 1.0, scale])
                 }
             }
         })
@@ -138,44 +148,56 @@ fn records(models: &[Model], tables: &Tables<'_>, columns: u32) -> Vec<Record> {
     records
 }
 
+/// The tables of all ladders one after the other, on as many threads as there are processors.
+fn importance_tables(materials: &[Material], ladders: &[Ladder]) -> Vec<ImportanceTable> {
+    let all: Vec<_> = materials.iter().zip(ladders).flat_map(|(m, l)| (0..l.steps()).map(move |i| (m, l, i))).collect();
+    let threads = std::thread::available_parallelism().map_or(1, usize::from);
+    let build = |part: &[(&Material, &Ladder, usize)]| part.iter().map(|(m, l, i)| l.table(m, *i)).collect::<Vec<_>>();
+    std::thread::scope(|scope| {
+        let parts = all.chunks(all.len().div_ceil(threads).max(1));
+        let running: Vec<_> = parts.map(|part| (part, scope.spawn(move || build(part)))).collect();
+        running.into_iter().flat_map(|(part, thread)| thread.join().unwrap_or_else(|_| build(part))).collect()
+    })
+}
+
 impl MaterialsUpload {
-    pub fn new(build: &mut Build<'_>, models: &[Model]) -> Result<Self> {
-        if models.is_empty() || models.len() > MAX_MATERIALS {
-            return Err(Error::invalid("materials", format!("1 to {MAX_MATERIALS}"), models.len()));
+    pub fn new(build: &mut Build<'_>, materials: &[Material]) -> Result<Self> {
+        if materials.is_empty() || materials.len() > MAX_MATERIALS {
+            return Err(Error::invalid("materials", format!("1 to {MAX_MATERIALS}"), materials.len()));
         }
-        for (i, model) in models.iter().enumerate() {
-            let valid = match model {
-                Model::Ggx(ggx) => ggx.validate(),
-                Model::BlinnPhong(blinn_phong) => blinn_phong.validate(),
-                Model::Table(_) | Model::Turned(_) | Model::Vmf(_) => Ok(()),
-            };
-            valid.map_err(|e| match e {
+        for (i, material) in materials.iter().enumerate() {
+            material.validate().map_err(|e| match e {
                 Error::InvalidInput { field, expected, got } => Error::invalid(format!("materials[{i}].{field}"), expected, got),
                 other => other,
             })?;
         }
-        let tables = Tables::of(models);
+        let tables = Tables::of(materials);
         let limit = build.cx.limits.max_image_dimension3_d;
         let atlas = place(0, tables.all.len(), limit)
             .ok_or_else(|| Error::invalid("materials", format!("tables that fit a 3-D image of side {limit}"), tables.all.len()))?
             .1;
-        let records = records(models, &tables, atlas[0]);
         let packed: Vec<_> = tables.all.iter().map(|(table, scale)| table.packed_at(*scale)).collect();
-        let importance: Vec<_> = models.iter().map(|m| ImportanceTable::build(m)).collect();
+        let ladders: Vec<_> = materials.iter().map(Ladder::of).collect();
+        let firsts = ladders.iter().scan(0, |next, ladder| Some(std::mem::replace(next, *next + ladder.steps())));
+        let places: Vec<_> = ladders.iter().zip(firsts).map(|(ladder, first)| ladder.record(first)).collect();
+        let records = records(materials, &tables, &places, atlas[0]);
+        let importance = importance_tables(materials, &ladders);
         let image = |name, format, extent| ImageDesc::new(name, format, extent, vk::ImageUsageFlags::SAMPLED);
         let angles = VIEW_ANGLES as u32;
-        let count = models.len() as u32;
+        let columns = importance.len().div_ceil(TILES_A_COLUMN) as u32;
+        let count = importance.len().min(TILES_A_COLUMN) as u32;
         let table_extent = [PHI_DIFF as u32, THETA_DIFF as u32 * atlas[0], THETA_HALF as u32 * atlas[1]];
-        let cell_extent = [angles * COLUMNS as u32, ROWS as u32 * count, 1];
+        let cell_extent = [columns * angles * COLUMNS as u32, ROWS as u32 * count, 1];
         // A power of two on both sides: coordinates are exact, so that a clamp at a tile's edge keeps its neighbour out.
-        let density_extent = [angles * DENSITY_COLUMNS as u32, DENSITY_ROWS as u32 * count.next_power_of_two(), 1];
+        let density_extent =
+            [columns.next_power_of_two() * angles * DENSITY_COLUMNS as u32, DENSITY_ROWS as u32 * count.next_power_of_two(), 1];
         let texels = table_atlas(&packed, atlas);
-        let cells = side_by_side(importance.iter().map(ImportanceTable::cells), ROWS, COLUMNS);
-        let mut density: Vec<f16> =
-            side_by_side(importance.iter().map(ImportanceTable::density_texels), DENSITY_ROWS, DENSITY_COLUMNS)
-                .into_iter()
-                .map(f16::from_f32)
-                .collect();
+        let cells = in_columns(importance.iter().map(ImportanceTable::cells), ROWS, COLUMNS, columns as usize, [0.0; 4]);
+        let tiles = importance.iter().map(ImportanceTable::density_texels);
+        let mut density: Vec<f16> = in_columns(tiles, DENSITY_ROWS, DENSITY_COLUMNS, columns.next_power_of_two() as usize, 0.0)
+            .into_iter()
+            .map(f16::from_f32)
+            .collect();
         density.resize(density_extent[0] as usize * density_extent[1] as usize, f16::ZERO);
         let cast = bytemuck::cast_slice::<u32, u8>;
         Ok(Self {
@@ -191,7 +213,13 @@ impl MaterialsUpload {
                 image("importance density", vk::Format::R16_SFLOAT, density_extent),
                 bytemuck::cast_slice(&density),
             )?,
+            maps: MapsUpload::new(build, materials)?,
         })
+    }
+
+    /// Classes that hold maps of each kind.
+    pub fn uses(&self) -> Uses {
+        self.maps.uses
     }
 
     pub fn record(self, rec: &mut Recorder<'_>, bag: &mut Retired) -> MaterialImages {
@@ -200,6 +228,7 @@ impl MaterialsUpload {
             tables: self.tables.record(rec, bag),
             importance: self.importance.record(rec, bag),
             density: self.density.record(rec, bag),
+            maps: self.maps.record(rec, bag),
         }
     }
 }
@@ -219,13 +248,24 @@ fn table_atlas(packed: &[Vec<u32>], [columns, rows]: [u32; 2]) -> Vec<u32> {
     atlas
 }
 
-/// Tiles of `rows x columns`, one a view angle, side by side; one row of tiles a material.
-fn side_by_side<'a, T: Copy + 'a>(materials: impl Iterator<Item = &'a [T]>, rows: usize, columns: usize) -> Vec<T> {
-    let mut out = Vec::new();
-    for tiles in materials {
-        for row in 0..rows {
-            for tile in tiles.chunks_exact(rows * columns) {
-                out.extend_from_slice(&tile[row * columns..(row + 1) * columns]);
+/// Tiles of `rows x columns`, one a view angle, side by side; tables one below the other, in as many columns as `across` says.
+fn in_columns<'a, T: Copy + 'a>(
+    tables: impl Iterator<Item = &'a [T]>,
+    rows: usize,
+    columns: usize,
+    across: usize,
+    empty: T,
+) -> Vec<T> {
+    let tables: Vec<_> = tables.collect();
+    let down = tables.len().min(TILES_A_COLUMN);
+    let width = VIEW_ANGLES * columns;
+    let mut out = vec![empty; across * width * rows * down];
+    for (i, tiles) in tables.into_iter().enumerate() {
+        let (column, place) = (i / TILES_A_COLUMN, i % TILES_A_COLUMN);
+        for (angle, tile) in tiles.chunks_exact(rows * columns).enumerate() {
+            for (row, cells) in tile.chunks_exact(columns).enumerate() {
+                let at = (place * rows + row) * across * width + column * width + angle * columns;
+                out[at..at + columns].copy_from_slice(cells);
             }
         }
     }
@@ -251,6 +291,7 @@ impl MaterialImages {
             states.forget(image.handle);
             image.retire(bag);
         }
+        self.maps.retire(states, bag);
     }
 }
 
@@ -303,8 +344,15 @@ mod tests {
     }
 
     #[test]
-    fn tiles_stand_side_by_side() {
-        let tiles = [1, 2, 3, 4, 5, 6, 7, 8]; // two tiles of 2 x 2
-        assert_eq!(side_by_side([tiles.as_slice()].into_iter(), 2, 2), [1, 2, 5, 6, 3, 4, 7, 8]);
+    fn tables_stand_in_columns() {
+        let table = |first: usize| -> Vec<usize> { (0..VIEW_ANGLES * 4).map(|i| first + i).collect() };
+        let tables: Vec<_> = (0..TILES_A_COLUMN + 1).map(|i| table(i * 1000)).collect();
+        let atlas = in_columns(tables.iter().map(Vec::as_slice), 2, 2, 2, 0);
+        let width = 2 * VIEW_ANGLES * 2;
+        let at = |x: usize, y: usize| atlas[y * width + x];
+        // Row 1, column 0 of angle 1's tile of table 0; of the last table, which begins the second column.
+        assert_eq!((at(0, 0), at(1, 0), at(0, 1), at(2, 0), at(2, 1)), (0, 1, 2, 4, 6));
+        assert_eq!((at(VIEW_ANGLES * 2, 0), at(VIEW_ANGLES * 2 + 2, 1)), (64_000, 64_006));
+        assert_eq!(at(0, 2), 1000);
     }
 }

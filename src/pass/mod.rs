@@ -4,7 +4,9 @@
 pub mod classify;
 pub mod curvature;
 pub mod environment;
+pub mod filter;
 pub mod gbuffer;
+pub(crate) mod maps;
 pub mod materials;
 pub mod modules;
 #[cfg(feature = "offline")]
@@ -40,7 +42,7 @@ pub(crate) struct PassContext<'a, 'b> {
 
 /// The shader interfaces of all compute modules, for tests and host profilers.
 pub fn interfaces() -> Vec<Interface> {
-    let mut all = vec![curvature::INTERFACE, classify::INTERFACE, shade::INTERFACE, resolve::INTERFACE];
+    let mut all = vec![filter::INTERFACE, curvature::INTERFACE, classify::INTERFACE, shade::INTERFACE, resolve::INTERFACE];
     all.extend(tonemap::INTERFACES);
     all
 }

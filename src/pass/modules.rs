@@ -18,6 +18,7 @@ macro_rules! modules {
 modules! {
     "gbuffer.vert",
     "gbuffer.frag",
+    "filter.comp",
     "curvature.comp",
     "classify.comp",
     "shade.comp",

@@ -34,6 +34,8 @@ pub const INTERFACE: Interface = Interface {
         D::STORAGE_BUFFER,
         D::STORAGE_IMAGE,
         D::STORAGE_BUFFER,
+        D::COMBINED_IMAGE_SAMPLER,
+        D::COMBINED_IMAGE_SAMPLER,
     ],
 };
 
@@ -49,6 +51,9 @@ pub(crate) struct Io<'a> {
     pub frame: &'a Buffer,
     pub bridge: BridgeSets,
     pub samplers: &'a Samplers,
+    /// Of the `filter` pass.
+    pub normals: &'a Image,
+    pub factors: &'a Image,
     pub environment: &'a EnvironmentImages,
     pub materials: &'a MaterialImages,
     pub arguments: &'a Buffer,
@@ -80,6 +85,8 @@ impl Shade {
         rec.begin(NAME);
         io.environment.sampled(rec);
         io.materials.sampled(rec);
+        rec.image(io.normals, Access::COMPUTE_SAMPLED);
+        rec.image(io.factors, Access::COMPUTE_SAMPLED);
         rec.buffer(io.arguments, Access::INDIRECT);
         rec.buffer(io.arguments, Access::COMPUTE_READ);
         rec.buffer(io.list, Access::COMPUTE_READ);
@@ -93,6 +100,8 @@ impl Shade {
             Resource::Buffer(io.list),
             Resource::Storage(io.radiance.view),
             Resource::Buffer(io.lights),
+            Resource::Sampled(io.normals, io.samplers.nearest),
+            Resource::Sampled(io.factors, io.samplers.nearest),
         ];
         let Directions { brdf, environment, light } = io.directions;
         let push = Push { brdf_samples: brdf, environment_samples: environment, light_samples: light };

@@ -134,7 +134,7 @@ impl Rig {
             // SAFETY: the command buffer is recording.
             let mut bag = unsafe { renderer.record_environment(cmd, &sky(), memory) }.unwrap();
             // SAFETY: as above.
-            bag.append(unsafe { renderer.record_materials(cmd, &[grey()], memory) }.unwrap());
+            bag.append(unsafe { renderer.record_materials(cmd, &[grey().into()], memory) }.unwrap());
             ((), bag)
         });
         renderer

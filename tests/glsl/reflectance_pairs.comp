@@ -22,7 +22,10 @@ void main() {
     vec3 wi = uintBitsToFloat(entries[i].xyz);
     vec3 wo = uintBitsToFloat(entries[i + 1u].xyz);
     float turn = uintBitsToFloat(entries[i + 1u].w);
-    Material m = material_load(entries[i].w, wo.z, vec2(cos(turn), sin(turn)));
+    // As without maps: vMF lobes have no diffuse base.
+    Factors factors = NO_FACTORS;
+    factors.albedo *= materials[entries[i].w].kind.x == REFLECTANCE_VMF ? 0.0 : 1.0;
+    Material m = material_load(entries[i].w, wo.z, vec3(cos(turn), sin(turn), 1.0), factors);
     vec3 h = normalize(wi + wo);
     values[i] = vec4(material_evaluate(m, wi, wo, h), material_density(m, h));
     values[i + 1u] = material_sample(m, entries[i].xy ^ entries[i + 1u].zx);

@@ -1,0 +1,109 @@
+#version 460
+// What a surface's textures say at the pixel's scale: the shading normal, factors on the reflectance's colours and its
+// roughness. Filter `point`: colours through their mips by the footprint, normals and roughness from the base level.
+// src/material.rs is the f64 twin.
+#include "frame.glsl"
+#include "gbuffer.glsl"
+#include "tangent.glsl"
+#include "factors.glsl"
+
+layout(local_size_x = 8, local_size_y = 8) in;
+
+// Classes in which there are maps of a kind, one bit each: others are compiled away.
+layout(constant_id = 0) const uint ALBEDO_CLASSES = 0u;
+layout(constant_id = 1) const uint SPECULAR_CLASSES = 0u;
+layout(constant_id = 2) const uint NORMAL_CLASSES = 0u;
+layout(constant_id = 3) const uint ROUGHNESS_CLASSES = 0u;
+
+struct MapRecord {
+    uvec4 places;  // albedo, specular, normal, roughness: 0 for none, else (layer << 3 | class) + 1
+    vec4 tiling;   // factors on uv; rule of the roughness map; albedo factor without an albedo map
+};
+layout(set = 2, binding = 1, std430) readonly buffer Maps {
+    MapRecord maps[]; // by material
+};
+layout(set = 2, binding = 2) uniform sampler2DArray textures_0;
+layout(set = 2, binding = 3) uniform sampler2DArray textures_1;
+layout(set = 2, binding = 4) uniform sampler2DArray textures_2;
+layout(set = 2, binding = 5) uniform sampler2DArray textures_3;
+layout(set = 2, binding = 6) uniform sampler2DArray textures_4;
+layout(set = 2, binding = 7) uniform sampler2DArray textures_5;
+layout(set = 2, binding = 8) uniform sampler2DArray textures_6;
+layout(set = 2, binding = 9) uniform sampler2DArray textures_7;
+layout(set = 2, binding = 10, rgba32f) uniform writeonly image2D normals;   // shading normal; tangent as tangent.glsl encodes it
+layout(set = 2, binding = 11, rgba32ui) uniform writeonly uimage2D factors; // as factors.glsl packs them
+
+// Rules of a roughness map's value v, in the order of src/pass/maps.rs; the first two are v itself.
+const float RULE_CONCENTRATION = 1.0;
+const float RULE_ALPHA_OF_KAPPA = 2.0;  // sqrt(2 / v)
+const float RULE_EXPONENT_OF_ALPHA = 3.0; // 2 / v^2 - 2
+const float RULE_KAPPA_OF_ALPHA = 4.0;  // 2 / v^2
+const float LEAST_ALPHA = 1e-3;
+const float MOST_CONCENTRATION = 2.0 / (LEAST_ALPHA * LEAST_ALPHA);
+
+// The level whose texels are as large as the longer derivative.
+float level(sampler2DArray t, vec4 footprint) {
+    vec2 size = vec2(textureSize(t, 0).xy);
+    vec2 x = footprint.xy * size, y = footprint.zw * size;
+    return 0.5 * log2(max(max(dot(x, x), dot(y, y)), 1.0));
+}
+
+// A map's value; `base` looks it up in level 0. Textures count rows from the top, coordinates upwards.
+#define LOOK_UP(i) \
+    if ((classes & (1u << i)) != 0u) { \
+        vec4 fetched = textureLod(textures_##i, at, base ? 0.0 : level(textures_##i, footprint)); \
+        value = place.x == float(i) ? fetched : value; \
+    }
+vec4 look_up(uint classes, uint code, vec2 uv, vec4 footprint, bool base, vec4 without) {
+    int slot = int(code) - 1;
+    vec2 place = vec2(slot < 0 ? -1 : (slot & 7), max(slot >> 3, 0));
+    vec3 at = slot < 0 ? vec3(0.0) : vec3(uv.x, 1.0 - uv.y, place.y);
+    vec4 value = without;
+    LOOK_UP(0)
+    LOOK_UP(1)
+    LOOK_UP(2)
+    LOOK_UP(3)
+    LOOK_UP(4)
+    LOOK_UP(5)
+    LOOK_UP(6)
+    LOOK_UP(7)
+    return value;
+}
+
+// The model's own parameter.
+float roughness_by_rule(float rule, float v) {
+    v = max(v, 0.0);
+    float concentration = rule == RULE_CONCENTRATION ? v : 2.0 / (v * v) - (rule == RULE_EXPONENT_OF_ALPHA ? 2.0 : 0.0);
+    float alpha = rule == RULE_ALPHA_OF_KAPPA ? sqrt(2.0 / v) : v;
+    bool concentrated = rule == RULE_CONCENTRATION || rule >= RULE_EXPONENT_OF_ALPHA;
+    return concentrated ? clamp(concentration, 0.0, MOST_CONCENTRATION) : clamp(alpha, LEAST_ALPHA, 1.0);
+}
+
+void main() {
+    ivec2 p = ivec2(gl_GlobalInvocationID.xy);
+    if (any(greaterThanEqual(uvec2(p), frame.extent.xy)) || !gbuffer_covered(p)) {
+        return;
+    }
+    MapRecord record = maps[gbuffer_material(p)];
+    vec2 uv = gbuffer_uv(p) * record.tiling.xy;
+    vec4 footprint = gbuffer_footprint(p) * record.tiling.xyxy;
+    vec3 n = gbuffer_normal(p);
+    vec4 t = gbuffer_tangent(p);
+
+    Factors f;
+    f.albedo = look_up(ALBEDO_CLASSES, record.places.x, uv, footprint, false, vec4(record.tiling.w)).rgb;
+    f.specular = look_up(SPECULAR_CLASSES, record.places.y, uv, footprint, false, vec4(1.0)).rgb;
+    f.roughness = NO_ROUGHNESS;
+    if (ROUGHNESS_CLASSES != 0u) {
+        float v = look_up(ROUGHNESS_CLASSES, record.places.w, uv, footprint, true, vec4(1.0)).x;
+        f.roughness = record.places.w != 0u ? roughness_by_rule(record.tiling.z, v) : NO_ROUGHNESS;
+    }
+    if (NORMAL_CLASSES != 0u) {
+        vec2 xy = look_up(NORMAL_CLASSES, record.places.z, uv, footprint, true, vec4(0.0)).xy;
+        vec3 local = vec3(xy, sqrt(max(1.0 - dot(xy, xy), 0.0)));
+        vec3 bent = normalize(t.xyz * local.x + cross(n, t.xyz) * (t.w * local.y) + n * local.z);
+        n = record.places.z != 0u && t.w != 0.0 ? bent : n;
+    }
+    imageStore(normals, p, vec4(n, tangent_encode(n, t.xyz, t.w)));
+    imageStore(factors, p, factors_pack(f));
+}
