@@ -32,7 +32,7 @@ fn world() -> World {
             indices: o.indices,
         }),
     });
-    let material = |(i, model)| Material { name: format!("{i}"), model };
+    let material = |(i, model)| Material { name: format!("{i}"), model, maps: Default::default() };
     World {
         name: "embed_minimal".into(),
         camera: Camera { position: scene::EYE, target: scene::TARGET, up: glam::DVec3::Y, fov_y: scene::FOV_Y },
