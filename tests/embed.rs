@@ -32,7 +32,7 @@ fn world() -> World {
             indices: o.indices,
         }),
     });
-    let material = |(i, m): (usize, passband::Material)| Material { name: format!("{i}"), model: m.model };
+    let material = |(i, m): (usize, passband::Material)| Material { name: format!("{i}"), model: m.model, maps: m.maps };
     World {
         name: "embed_minimal".into(),
         camera: Camera { position: scene::EYE, target: scene::TARGET, up: glam::DVec3::Y, fov_y: scene::FOV_Y },

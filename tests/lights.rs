@@ -28,7 +28,7 @@ fn world(model: Model, lights: &[Light]) -> World {
             transform: Mat4::IDENTITY,
             material: 0,
         }],
-        materials: vec![Material { name: "material".into(), model }],
+        materials: vec![Material { name: "material".into(), model, maps: Default::default() }],
     }
 }
 

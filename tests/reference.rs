@@ -65,7 +65,7 @@ fn world(map: LatLong) -> World {
         lights: Vec::new(),
         environment: Some(EnvironmentLight { map, intensity: 1.0, rotation: 0.0, visible: false }),
         objects: vec![Object { mesh: Arc::new(sphere(96, 48)), transform: Mat4::IDENTITY, material: 0 }],
-        materials: vec![Material { name: "material".into(), model }],
+        materials: vec![Material { name: "material".into(), model, maps: Default::default() }],
     }
 }
 

@@ -19,7 +19,11 @@ const PAIRS: u32 = 10_000;
 const TOLERANCE: f64 = 1e-3;
 
 fn session(models: &[Model]) -> Session {
-    let materials = models.iter().enumerate().map(|(i, m)| Material { name: i.to_string(), model: m.clone() }).collect();
+    let materials = models
+        .iter()
+        .enumerate()
+        .map(|(i, m)| Material { name: i.to_string(), model: m.clone(), maps: Default::default() })
+        .collect();
     let camera = Camera { position: DVec3::Z, target: DVec3::ZERO, up: DVec3::Y, fov_y: 40.0 };
     let world = World { name: "probe".into(), camera, size: None, environment: None, lights: vec![], objects: vec![], materials };
     let config = Config::new([8, 8]);

@@ -77,6 +77,14 @@ fn keys_that_work() {
         ("material", "[materials.other]\nreflectance = { builtin = 'rough' }"),
         ("material", "[materials.other]\nreflectance = { merl = 'x.binary' }"),
         ("material", "[settings]"),
+        (
+            "material",
+            "albedo_map = 'a.png'\nspecular_map = 'a.jpg'\nnormal_map = 'a.exr'\nroughness_map = 'a.jpeg'\ntiling = [2, 3]",
+        ),
+        ("material", "height_map = 'a.hdr'\nheight_scale = 0.1"),
+        ("material", "height_map = 'a.PNG'\nheight_scale = -0.1\ndisplace = true\nnormal_map = 'n.png'"),
+        ("material", "normal_map = 'n.png'\nnormal_encoding = 'auto'\nnormal_y = 'down'"),
+        ("material", "roughness_map = 'n.png'\nroughness = 'kappa'"),
     ];
     for (mark, text) in lines {
         load_text(&with(mark, text), &[]).unwrap_or_else(|e| panic!("{text}: {e}"));
@@ -90,7 +98,6 @@ fn keys_that_work() {
 
 #[test]
 fn keys_that_do_not_work_yet_say_so() {
-    let maps = "normal_map = 'n.png'\nheight_map = 'h.exr'\nroughness_map = 'r.jpg'\n";
     let mut lines = vec![
         ("material", "[animation]\nframes = 3".into(), "animation"),
         (
@@ -102,22 +109,6 @@ fn keys_that_do_not_work_yet_say_so() {
             "animation",
         ),
     ];
-    let materials = [
-        "albedo_map = 'a.png'",
-        "specular_map = 'a.jpg'",
-        "normal_map = 'a.exr'",
-        "height_map = 'a.hdr'",
-        "roughness_map = 'a.jpeg'",
-        "tiling = [2, 3]",
-    ];
-    for text in materials {
-        lines.push(("material", text.into(), text.split(' ').next().unwrap()));
-    }
-    // These need their maps, which are not supported either and are named first.
-    for text in ["height_scale = 0.1", "displace = true", "roughness = 'alpha'", "normal_encoding = 'auto'", "normal_y = 'down'"]
-    {
-        lines.push(("material", maps.to_string() + text, "normal_map"));
-    }
     let settings = [
         "operator = 'box'",
         "operator = 'clipped'",
@@ -213,6 +204,11 @@ fn values_are_checked() {
         ("material", "normal_map = 'x.png'\nnormal_y = 'left'", 14, "normal_y"),
         ("material", "roughness_map = 'x.png'\nroughness = 'gloss'", 14, "roughness"),
         ("material", "tiling = [0, 1]", 13, "tiling"),
+        ("material", "tiling = [1, inf]", 13, "tiling"),
+        ("material", "height_map = 'x.png'\nheight_scale = inf", 14, "height_scale"),
+        ("material", "height_map = 'x.png'\nnormal_map = 'x.png'", 13, "displace = true"),
+        ("material", "displace = true", 13, "height_map"),
+        ("material", "roughness = 'alpha'", 13, "roughness_map"),
         ("material", "[settings]\noperator = 'sphere'", 14, "settings.operator"),
         ("material", "[settings]\neps = 1.5", 14, "settings.eps"),
         ("material", "[settings]\nlmax = 99", 14, "settings.lmax"),
@@ -366,8 +362,8 @@ fn overrides_are_checked_like_the_file() {
     }
     let deep = vec!["a"; 100_000].join(".");
     assert!(matches!(load_text(BASE, &[(&deep, "1")]), Err(Error::Argument { .. })));
-    let e = load_text(BASE, &[("materials.grey.tiling", "[2, 2]")]).unwrap_err();
-    assert_eq!(e.to_string(), "--set materials.grey.tiling is not supported yet");
+    let e = load_text(BASE, &[("settings.eps", "0.5")]).unwrap_err();
+    assert_eq!(e.to_string(), "--set settings.eps is not supported yet");
     // A mistake in the file stays the file's.
     let e = load_text(&with("camera", "fov = 3"), &[("environment.intensity", "2")]).unwrap_err();
     assert!(matches!(e, Error::File { at: At::Line(3), .. }), "{e}");

@@ -16,4 +16,5 @@ pub mod render;
 pub mod scene;
 pub mod session;
 pub mod stats;
+pub mod texture;
 pub mod world;

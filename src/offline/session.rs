@@ -93,7 +93,7 @@ impl Session {
         setup.push(("pipelines", milliseconds(clock)));
 
         let clock = Instant::now();
-        let materials: Vec<_> = world.materials.iter().map(|m| crate::Material::from(m.model.clone())).collect();
+        let materials: Vec<_> = world.materials.iter().map(|m| m.surface()).collect();
         // SAFETY: the command buffer is recording and submitted at once.
         headless.submit(|cmd, memory| Ok(unsafe { renderer.record_materials(cmd, &materials, memory) }?))?;
         setup.push((crate::pass::materials::NAME, milliseconds(clock)));

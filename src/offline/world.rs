@@ -1,9 +1,9 @@
 //! A scene that has been read and resolved: everything in memory, ready to be uploaded or integrated.
 
-use crate::Light;
 use crate::offline::mesh::Mesh;
 use crate::reflectance::Model;
 use crate::sampling::LatLong;
+use crate::{Light, Maps};
 use glam::{DMat3, DMat4, DVec2, DVec3, Mat4};
 use std::sync::Arc;
 
@@ -75,13 +75,22 @@ impl Object {
     }
 }
 
-/// A named reflectance.
+/// A named material.
 #[derive(Clone, Debug)]
 pub struct Material {
     /// The scene file's name for it.
     pub name: String,
     /// Its reflectance.
     pub model: Model,
+    /// What varies it over a surface.
+    pub maps: Maps,
+}
+
+impl Material {
+    /// Without the name.
+    pub fn surface(&self) -> crate::Material {
+        crate::Material { model: self.model.clone(), maps: self.maps.clone() }
+    }
 }
 
 /// A whole scene, resolved.

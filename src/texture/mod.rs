@@ -164,18 +164,9 @@ impl Texture {
     }
 
     fn bilinear(&self, level: usize, uv: DVec2) -> DVec4 {
-        let [w, h] = self.levels[level].size;
-        let (x, along_x) = axis(uv.x, w);
-        let (y, along_y) = axis(1.0 - uv.y, h);
-        let row = |y| self.texel(level, [x[0], y]).lerp(self.texel(level, [x[1], y]), along_x);
-        row(y[0]).lerp(row(y[1]), along_y)
-    }
-
-    fn texel(&self, level: usize, [x, y]: [u32; 2]) -> DVec4 {
         let Level { size, texels } = &self.levels[level];
         let bytes = self.format.bytes();
-        let at = (y as usize * size[0] as usize + x as usize) * bytes;
-        self.format.decode(&texels[at..at + bytes])
+        bilinear(*size, uv, |i| self.format.decode(&texels[i * bytes..(i + 1) * bytes]))
     }
 
     /// Its level 0 at another size, bilinear, with mips of its own.
@@ -197,6 +188,18 @@ impl Texture {
     }
 }
 
+/// Between the four of `size` texels, numbered row by row from the top, next to `uv`; `v` grows upwards.
+pub(crate) fn bilinear<T>(size: [u32; 2], uv: DVec2, texel: impl Fn(usize) -> T) -> T
+where
+    T: std::ops::Add<Output = T> + std::ops::Mul<f64, Output = T>,
+{
+    let (x, along_x) = axis(uv.x, size[0]);
+    let (y, along_y) = axis(1.0 - uv.y, size[1]);
+    let at = |x: u32, y: u32| texel(y as usize * size[0] as usize + x as usize);
+    let row = |y| at(x[0], y) * (1.0 - along_x) + at(x[1], y) * along_x;
+    row(y[0]) * (1.0 - along_y) + row(y[1]) * along_y
+}
+
 /// The two texels next to `unit` on a repeating axis, and the weight of the second.
 fn axis(unit: f64, side: u32) -> ([u32; 2], f64) {
     let side = f64::from(side);
@@ -206,7 +209,7 @@ fn axis(unit: f64, side: u32) -> ([u32; 2], f64) {
 }
 
 /// Sides within limits and a texel for each.
-fn check([width, height]: [u32; 2], texels: usize) -> Result<()> {
+pub(crate) fn check([width, height]: [u32; 2], texels: usize) -> Result<()> {
     if !((1..=MAX_SIDE).contains(&width) && (1..=MAX_SIDE).contains(&height)) {
         let expected = format!("1x1 to {MAX_SIDE}x{MAX_SIDE}");
         return Err(Error::invalid("texture size", expected, format!("{width}x{height}")));
@@ -215,7 +218,7 @@ fn check([width, height]: [u32; 2], texels: usize) -> Result<()> {
     if texels == expected { Ok(()) } else { Err(Error::invalid("texture", format!("{expected} texels"), texels)) }
 }
 
-fn finite(size: [u32; 2], texels: impl IntoIterator<Item = impl AsRef<[f32]>>) -> Result<()> {
+pub(crate) fn finite(size: [u32; 2], texels: impl IntoIterator<Item = impl AsRef<[f32]>>) -> Result<()> {
     for (at, texel) in texels.into_iter().enumerate() {
         if let Some(value) = texel.as_ref().iter().find(|c| !c.is_finite()) {
             return Err(Error::invalid(place(size, at), "finite values", value));

@@ -1,5 +1,6 @@
 //! Metallic-roughness materials and their encoded images.
 
+use crate::material::LEAST_ALPHA;
 use crate::offline::error::{Error, Result};
 use crate::offline::gltf::document::Document;
 use crate::reflectance::Ggx;
@@ -10,15 +11,12 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 /// Specular reflectance at normal incidence of what is no metal (glTF 2.0 specification, appendix B.2.1).
-const DIELECTRIC: f64 = 0.04;
-
-/// The least GGX alpha that [`Material::ggx`] gives: a smooth mirror has no finite lobe.
-const LEAST_ALPHA: f64 = 1e-3;
+pub(super) const DIELECTRIC: f64 = 0.04;
 
 /// The metallic-roughness part of a glTF material. Factors multiply what the textures hold.
 ///
-/// Textures are carried, encoded as they stand in the file, but nothing in this crate samples them yet: what is shaded is
-/// [`Material::ggx`], which knows the factors only. Emission, occlusion, transparency, sidedness and samplers are left out.
+/// Textures are carried, encoded as they stand in the file; scenes decode them. Emission, occlusion, transparency, sidedness,
+/// samplers and texture transforms are left out.
 #[derive(Clone, Debug)]
 pub struct Material {
     /// The file's name for it, or `material N`.

@@ -15,8 +15,10 @@ mod document;
 mod material;
 mod nodes;
 mod primitive;
+mod shading;
 
 pub use material::Material;
+pub(crate) use shading::shaded;
 
 /// A part of the model with one material.
 #[derive(Clone, Debug)]

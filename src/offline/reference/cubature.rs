@@ -2,7 +2,7 @@
 
 use crate::offline::reference::environment::{Parts, Region, Tree};
 use crate::reflectance::Reflectance;
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 use std::collections::BinaryHeap;
 use std::f64::consts::FRAC_PI_2;
 
@@ -72,16 +72,38 @@ impl Ord for Leaf {
 
 /// The integrand without the environment: reflectance times cosine over directions in the map's frame.
 struct Lobe<'a> {
-    tangent: DVec3,
-    bitangent: DVec3,
+    frame: Frame,
     normal: DVec3,
+    /// In the local frame.
     view: DVec3,
     reflectance: &'a dyn Reflectance,
 }
 
+/// A surface's frame in the map's: unit vectors at right angles, left-handed where texture coordinates are mirrored.
+#[derive(Clone, Copy, Debug)]
+pub struct Frame {
+    tangent: DVec3,
+    bitangent: DVec3,
+    normal: DVec3,
+}
+
+impl Frame {
+    /// About unit `normal`, which may have been bent away from the tangent (with handedness); an arbitrary tangent without one.
+    pub fn new(normal: DVec3, tangent: Option<(DVec3, f64)>) -> Self {
+        let across = tangent.and_then(|(t, side)| Some(((t - normal * normal.dot(t)).try_normalize()?, side)));
+        let (tangent, side) = across.unwrap_or_else(|| (normal.any_orthonormal_vector(), 1.0));
+        Self { tangent, bitangent: normal.cross(tangent) * side, normal }
+    }
+
+    /// The same in other coordinates.
+    pub fn turned(self, by: DMat3) -> Self {
+        Self { tangent: by * self.tangent, bitangent: by * self.bitangent, normal: by * self.normal }
+    }
+}
+
 impl Lobe<'_> {
     fn local(&self, w: DVec3) -> DVec3 {
-        DVec3::new(w.dot(self.tangent), w.dot(self.bitangent), w.dot(self.normal))
+        DVec3::new(w.dot(self.frame.tangent), w.dot(self.frame.bitangent), w.dot(self.normal))
     }
 
     fn at(&self, w: DVec3) -> DVec3 {
@@ -116,13 +138,13 @@ impl Lobe<'_> {
     }
 }
 
-/// `L(v) = integral of L_i(w) rho(w, v) (w.n)+ dw` (Bagher et al. 2011, eq. 1, no visibility) for unit `normal` and unit
-/// direction `view` to the viewer, both in the map's frame. The tangent is arbitrary: reflectances are isotropic.
+/// `L(v) = integral of L_i(w) rho(w, v) (w.n)+ dw` (Bagher et al. 2011, eq. 1, no visibility) for a surface of `frame` and unit
+/// direction `view` to the viewer, both in the map's coordinates.
 ///
 /// Regions are split at their largest change, worst first, until the sum of the changes meets [`Options::tolerance`].
-pub fn integrate(tree: &Tree, normal: DVec3, view: DVec3, reflectance: &dyn Reflectance, options: &Options) -> Estimate {
-    let (tangent, bitangent) = normal.any_orthonormal_pair();
-    let mut lobe = Lobe { tangent, bitangent, normal, view, reflectance };
+pub fn integrate(tree: &Tree, frame: Frame, view: DVec3, reflectance: &dyn Reflectance, options: &Options) -> Estimate {
+    let normal = frame.normal;
+    let mut lobe = Lobe { frame, normal, view, reflectance };
     lobe.view = lobe.local(view);
     let mirror = (normal * (2.0 * normal.dot(view)) - view).normalize();
     let seeds = seeds(tree, normal, mirror, lobe.width(mirror), HORIZON * options.tolerance.max(1e-8).sqrt());

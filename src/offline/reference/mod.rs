@@ -23,7 +23,8 @@ pub struct Reference<'a> {
     world: &'a World,
     extent: [u32; 2],
     options: Options,
-    reflectances: Vec<&'a dyn Reflectance>,
+    /// In the place of the materials' own.
+    reflectances: Option<Vec<&'a dyn Reflectance>>,
     hits: Vec<Option<Hit>>,
     environment: Option<Tree<'a>>,
 }
@@ -68,11 +69,13 @@ impl<'a> Reference<'a> {
     /// # Errors
     /// [`Error::InvalidInput`] for an empty extent, a degenerate camera, or an index of a mesh or object out of range.
     pub fn new(world: &'a World, extent: [u32; 2], options: Options) -> Result<Self> {
-        let reflectances = world.materials.iter().map(|m| &m.model as &dyn Reflectance).collect();
-        Self::with_reflectances(world, extent, options, reflectances)
+        let hits = visibility::trace(world, extent)?;
+        let environment = world.environment.as_ref().map(|light| Tree::new(&light.map));
+        Ok(Self { world, extent, options, reflectances: None, hits, environment })
     }
 
-    /// As [`Reference::new`] with one reflectance per material in place of the materials' own.
+    /// As [`Reference::new`] with one reflectance per material in place of the materials' own, whose maps then count for
+    /// normals only.
     ///
     /// # Errors
     /// As [`Reference::new`], and when the counts differ.
@@ -85,9 +88,7 @@ impl<'a> Reference<'a> {
         if reflectances.len() != world.materials.len() {
             return Err(Error::invalid("reflectances", format!("{} of them", world.materials.len()), reflectances.len()));
         }
-        let hits = visibility::trace(world, extent)?;
-        let environment = world.environment.as_ref().map(|light| Tree::new(&light.map));
-        Ok(Self { world, extent, options, reflectances, hits, environment })
+        Ok(Self { reflectances: Some(reflectances), ..Self::new(world, extent, options)? })
     }
 
     /// What each pixel's centre sees, row-major.
@@ -125,10 +126,18 @@ impl<'a> Reference<'a> {
     /// Radiance that leaves a hit towards the viewer.
     pub fn shade(&self, hit: &Hit) -> Estimate {
         let (Some(light), Some(tree)) = (&self.world.environment, &self.environment) else { return Estimate::default() };
-        let Some(reflectance) = self.reflectances.get(hit.material) else { return Estimate::default() };
         let map_from_world = DMat3::from_rotation_y(-light.rotation.to_radians());
-        let (normal, view) = (map_from_world * hit.normal, map_from_world * hit.view);
-        let mut estimate = cubature::integrate(tree, normal, view, *reflectance, &self.options);
+        let frame = cubature::Frame::new(hit.normal, hit.tangent).turned(map_from_world);
+        let view = map_from_world * hit.view;
+        let integrate = |reflectance: &dyn Reflectance| cubature::integrate(tree, frame, view, reflectance, &self.options);
+        let given = self.reflectances.as_ref().map(|all| all.get(hit.material));
+        let mut estimate = match (given, self.world.materials.get(hit.material)) {
+            (Some(Some(reflectance)), _) => integrate(*reflectance),
+            // Without maps, the model itself: a table need not be copied.
+            (None, Some(material)) if material.maps.is_empty() => integrate(&material.model),
+            (None, Some(material)) => integrate(&hit.point.reflectance(&material.model)),
+            _ => return Estimate::default(),
+        };
         estimate.radiance *= light.intensity;
         estimate
     }

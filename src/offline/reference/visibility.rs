@@ -1,8 +1,9 @@
 //! Which surface each pixel centre sees, by f64 ray-triangle intersection.
 
 use crate::error::{Error, Result};
+use crate::material::PointMaterial;
 use crate::offline::world::{Object, World};
-use glam::{DMat3, DVec2, DVec3};
+use glam::{DMat3, DVec2, DVec3, DVec4};
 
 /// Normals are bent so that their cosine with the view direction is at least this.
 pub const MIN_COSINE: f64 = 0.02;
@@ -14,8 +15,12 @@ pub struct Hit {
     pub object: usize,
     /// Index into [`World::materials`].
     pub material: usize,
-    /// Unit shading normal in world space, bent towards the viewer ([`bend`]).
+    /// Unit shading normal in world space, by the material's normal map if it has one, bent towards the viewer ([`bend`]).
     pub normal: DVec3,
+    /// Direction of growing `u` across the normal before it was bent, and handedness, if the mesh has tangents.
+    pub tangent: Option<(DVec3, f64)>,
+    /// What the material's maps say.
+    pub point: PointMaterial,
     /// Unit direction to the viewer in world space.
     pub view: DVec3,
     /// Distance along the view axis in metres.
@@ -91,14 +96,25 @@ pub fn trace(world: &World, extent: [u32; 2]) -> Result<Vec<Option<Hit>>> {
             }
         }
     }
-    let hits = rays.iter().zip(nearest).map(|(ray, found)| {
+    let materials: Vec<_> = world.materials.iter().map(|m| m.surface()).collect();
+    let hits = rays.iter().zip(nearest).enumerate().map(|(i, (ray, found))| {
         let found = found?;
         let object = world.objects.get(found.object)?;
         let depth = -found.distance * ray.dot(axes.z_axis);
+        let (uv, footprint) = coordinates(world, extent, &found, [i % width, i / width]).unwrap_or_default();
+        let point = materials.get(object.material)?.at(uv, footprint);
+        let smooth = shading_normal(object, &found);
+        let tangent = tangent(object, &found, smooth);
+        let mapped = tangent.map_or(smooth, |(t, side)| {
+            (t * point.normal.x + smooth.cross(t) * (side * point.normal.y) + smooth * point.normal.z).normalize()
+        });
+        let across = |(t, side): (DVec3, f64)| Some(((t - mapped * mapped.dot(t)).try_normalize()?, side));
         Some(Hit {
             object: found.object,
             material: object.material,
-            normal: bend(shading_normal(object, &found), -*ray),
+            normal: bend(mapped, -*ray),
+            tangent: tangent.and_then(across),
+            point,
             view: -*ray,
             depth,
         })
@@ -114,7 +130,7 @@ fn shading_normal(object: &Object, found: &Nearest) -> DVec3 {
     let [a, b, c] = found.corners;
     let w = found.weights;
     let smooth = get(&mesh.normals, a) * w.x + get(&mesh.normals, b) * w.y + get(&mesh.normals, c) * w.z;
-    let linear = DMat3::from_mat4(object.transform());
+    let linear = linear(object);
     // The inverse transpose up to a positive factor, defined for singular matrices too.
     let (x, y, z) = (linear.x_axis, linear.y_axis, linear.z_axis);
     let sign = if linear.determinant() < 0.0 { -1.0 } else { 1.0 };
@@ -126,8 +142,49 @@ fn shading_normal(object: &Object, found: &Nearest) -> DVec3 {
     (cofactor * smooth).try_normalize().or_else(flat).unwrap_or(DVec3::Y)
 }
 
+/// World from object without translation.
+fn linear(object: &Object) -> DMat3 {
+    DMat3::from_mat4(object.transform())
+}
+
+/// The interpolated tangent across unit `normal` and its handedness, which a mirror image swaps.
+fn tangent(object: &Object, found: &Nearest, normal: DVec3) -> Option<(DVec3, f64)> {
+    let [a, b, c] = found.corners.map(|i| object.mesh.tangents.get(i).map(|t| DVec4::from(t.map(f64::from))));
+    let w = found.weights;
+    let smooth = a? * w.x + b? * w.y + c? * w.z;
+    let linear = linear(object);
+    let along = linear * smooth.truncate();
+    let side = smooth.w * linear.determinant();
+    Some(((along - normal * normal.dot(along)).try_normalize()?, if side < 0.0 { -1.0 } else { 1.0 }))
+}
+
+/// Texture coordinate of pixel (x, y), and its differences between the pixels of its quad in x and in y, over the triangle's
+/// plane: what a rasteriser knows.
+fn coordinates(world: &World, extent: [u32; 2], found: &Nearest, [x, y]: [usize; 2]) -> Option<(DVec2, [DVec2; 2])> {
+    let object = world.objects.get(found.object)?;
+    let transform = object.transform();
+    let corner = |i: usize| Some(transform.transform_point3(object.mesh.positions.get(i)?.map(f64::from).into()));
+    let coordinate = |i: usize| object.mesh.uvs.get(i).map(|t| DVec2::from(t.map(f64::from)));
+    let [a, b, c] = found.corners;
+    let triangle = [corner(a)?, corner(b)?, corner(c)?];
+    let [a, b, c] = [coordinate(a)?, coordinate(b)?, coordinate(c)?];
+    let uv = |w: DVec3| a * w.x + b * w.y + c * w.z;
+    let at = |x: usize, y: usize| {
+        let ray = world.camera.ray(DVec2::new(x as f64 + 0.5, y as f64 + 0.5), extent);
+        plane(world.camera.position, ray, triangle).map(|(_, weights)| uv(weights))
+    };
+    let across = at(x | 1, y)? - at(x & !1, y)?;
+    let down = at(x, y | 1)? - at(x, y & !1)?;
+    Some((uv(found.weights), [across, down]))
+}
+
 /// Distance along the unit ray and barycentric coordinates (Moller and Trumbore 1997); edges belong to the triangle.
-fn intersect(origin: DVec3, ray: DVec3, [a, b, c]: [DVec3; 3]) -> Option<(f64, DVec3)> {
+fn intersect(origin: DVec3, ray: DVec3, triangle: [DVec3; 3]) -> Option<(f64, DVec3)> {
+    plane(origin, ray, triangle).filter(|(distance, weights)| weights.min_element() >= 0.0 && *distance > 0.0)
+}
+
+/// The same for the triangle's plane: coordinates may be negative.
+fn plane(origin: DVec3, ray: DVec3, [a, b, c]: [DVec3; 3]) -> Option<(f64, DVec3)> {
     let (ab, ac) = (b - a, c - a);
     let p = ray.cross(ac);
     let det = ab.dot(p);
@@ -137,7 +194,7 @@ fn intersect(origin: DVec3, ray: DVec3, [a, b, c]: [DVec3; 3]) -> Option<(f64, D
     let s = origin - a;
     let q = s.cross(ab);
     let (u, v, distance) = (s.dot(p) / det, ray.dot(q) / det, ac.dot(q) / det);
-    (u >= 0.0 && v >= 0.0 && u + v <= 1.0 && distance > 0.0).then(|| (distance, DVec3::new(1.0 - u - v, u, v)))
+    Some((distance, DVec3::new(1.0 - u - v, u, v)))
 }
 
 /// Projection to pixels, for bounding boxes only.

@@ -2,42 +2,11 @@
 
 use crate::offline::error::Result;
 use crate::offline::scene::check::{Check, span};
-use crate::offline::scene::format::{Animation, Material, Settings, Vector};
-use crate::offline::scene::source::Span;
+use crate::offline::scene::format::{Animation, Settings, Vector};
 use glam::DVec3;
 use toml::Spanned;
 
 impl Check<'_> {
-    pub(super) fn maps(&mut self, m: &Material) -> Result<()> {
-        for map in [&m.albedo_map, &m.specular_map, &m.normal_map, &m.height_map, &m.roughness_map] {
-            self.each(map, |c, v| c.extension(v, &["png", "jpg", "jpeg", "exr", "hdr"]).map(drop))?;
-            self.later.extend(span(map));
-        }
-        self.each(&m.height_scale, |c, v| c.number(v, "metres", |_| true))?;
-        self.each(&m.roughness, |c, v| c.name(v, &["alpha", "kappa"]))?;
-        self.each(&m.normal_encoding, |c, v| c.name(v, &["auto", "unit", "signed"]))?;
-        self.each(&m.normal_y, |c, v| c.name(v, &["up", "down"]))?;
-        self.each(&m.tiling, |c, v| {
-            let fits = v.get_ref().iter().all(|c| c.is_finite() && *c > 0.0);
-            c.require(fits, &v.span(), "two numbers above 0", format!("{:?}", v.get_ref()))
-        })?;
-        let needs: [(Option<Span>, &str, bool); 5] = [
-            (span(&m.height_scale), "height_map", m.height_map.is_some()),
-            (span(&m.displace), "height_map", m.height_map.is_some()),
-            (span(&m.roughness), "roughness_map", m.roughness_map.is_some()),
-            (span(&m.normal_encoding), "normal_map", m.normal_map.is_some()),
-            (span(&m.normal_y), "normal_map", m.normal_map.is_some()),
-        ];
-        for (at, map, there) in needs {
-            if let Some(at) = at {
-                self.require(there, &at, &format!("a {map} beside it"), "none")?;
-                self.later.push(at);
-            }
-        }
-        self.later.extend(span(&m.tiling));
-        Ok(())
-    }
-
     pub(super) fn animation(&mut self, animation: &Spanned<Animation>, objects: usize) -> Result<()> {
         let a = animation.get_ref();
         let frames = *a.frames.get_ref();

@@ -9,6 +9,7 @@ mod check;
 mod format;
 mod later;
 mod lights;
+mod maps;
 mod materials;
 mod overrides;
 mod resolve;

@@ -4,10 +4,11 @@ use crate::offline::error::{Error, Result};
 use crate::offline::gltf;
 use crate::offline::mesh::{self, Mesh, Projection};
 use crate::offline::scene::format::{Camera as CameraKeys, Object as ObjectKeys, Triple};
+use crate::offline::scene::maps::{self, Displacement, Textures};
+use crate::offline::scene::source::Span;
 use crate::offline::scene::{Scene, lights, materials};
 use crate::offline::world::{Camera, EnvironmentLight, Material, Object, World};
 use crate::offline::{builtin, environment};
-use crate::reflectance::Model;
 use glam::{DMat4, DQuat, DVec3, EulerRot};
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -16,24 +17,30 @@ use toml::Spanned;
 pub(super) fn world(scene: &Scene) -> Result<World> {
     let file = &scene.file;
     let mut models = materials::Models::default();
+    let mut textures = Textures::default();
     let mut all = Vec::new();
-    for (name, material) in &file.materials {
-        let model = models.get(scene, material.get_ref().reflectance.get_ref())?;
-        all.push(Material { name: name.clone(), model });
-    }
     let mut known = Known::default();
+    for (name, material) in &file.materials {
+        let keys = material.get_ref();
+        let model = models.get(scene, keys.reflectance.get_ref())?;
+        let (maps, displacement) = textures.of(scene, keys, &model)?;
+        all.push(Material { name: name.clone(), model, maps });
+        known.displacements.push(displacement);
+    }
+    drop(textures);
     let mut objects = Vec::new();
     let mut file_camera = None;
-    for object in file.objects.get_ref() {
-        let object = object.get_ref();
+    for spanned in file.objects.get_ref() {
+        let object = spanned.get_ref();
         let transform = transform(object);
         if let Some(name) = &object.material {
             // Known since the check; the names are the map's own.
             let material = file.materials.keys().position(|known| known == name.get_ref()).unwrap_or_default();
-            objects.push(Object { mesh: known.mesh(scene, object)?, transform: transform.as_mat4(), material });
+            let mesh = known.mesh(scene, object, (material, all.get(material)))?;
+            objects.push(Object { mesh, transform: transform.as_mat4(), material });
         }
         if object.is_gltf() && (object.material.is_none() || (file.camera.is_none() && file_camera.is_none())) {
-            let model = known.model(scene, object, &mut all)?;
+            let model = known.model(scene, spanned, &mut all)?;
             file_camera = file_camera.or(model.camera.map(|camera| moved(camera, transform)));
             if object.material.is_none() {
                 let placed = |(mesh, material): &(Arc<Mesh>, usize)| Object {
@@ -86,6 +93,8 @@ fn environment_light(scene: &Scene) -> Result<Option<EnvironmentLight>> {
 struct Known {
     meshes: HashMap<String, Arc<Mesh>>,
     models: HashMap<String, Arc<Parts>>,
+    /// Of the scene's own materials.
+    displacements: Vec<Option<Displacement>>,
 }
 
 /// A glTF file with its own materials.
@@ -96,46 +105,72 @@ struct Parts {
 }
 
 impl Known {
-    /// The whole mesh of an object.
-    fn mesh(&mut self, scene: &Scene, object: &ObjectKeys) -> Result<Arc<Mesh>> {
+    /// The whole mesh of an object, as its material wants it.
+    fn mesh(&mut self, scene: &Scene, object: &ObjectKeys, (index, material): (usize, Option<&Material>)) -> Result<Arc<Mesh>> {
         let name = |key: &Option<Spanned<String>>| key.as_ref().map_or(String::new(), |name| name.get_ref().clone());
         let key = format!("{} {} {}", name(&object.mesh), name(&object.builtin), name(&object.uv));
-        if let Some(mesh) = self.meshes.get(&key) {
-            return Ok(Arc::clone(mesh));
+        if !self.meshes.contains_key(&key) {
+            let mut mesh = match &object.mesh {
+                Some(file) => mesh::read(&scene.folder.join(file.get_ref()))?,
+                None => builtin::mesh(&name(&object.builtin), builtin::DEFAULT_DETAIL)?,
+            };
+            project(&mut mesh, scene, object)?;
+            self.meshes.insert(key.clone(), Arc::new(mesh));
         }
-        let mut mesh = match &object.mesh {
-            Some(file) => mesh::read(&scene.folder.join(file.get_ref()))?,
-            None => builtin::mesh(&name(&object.builtin), builtin::DEFAULT_DETAIL)?,
+        let plain = self.meshes.get(&key).map(Arc::clone).unwrap_or_default();
+        let (Some(material), Some(at)) = (material, &object.material) else { return Ok(plain) };
+        let displacement = self.displacements.get(index).and_then(Option::as_ref);
+        let key = match displacement {
+            Some(_) => format!("{key} displaced by {}", material.name),
+            None if maps::wants_tangents(material) && plain.tangents.is_empty() => format!("{key} with tangents"),
+            None => key,
         };
-        project(&mut mesh, scene, object)?;
-        let mesh = Arc::new(mesh);
-        self.meshes.insert(key, Arc::clone(&mesh));
-        Ok(mesh)
+        let misfit = |lack| unfit(scene, &at.span(), material, lack);
+        maps::fits(&plain, material, displacement).map_err(misfit)?;
+        if !self.meshes.contains_key(&key) {
+            let mut mesh = (*plain).clone();
+            maps::prepare(&mut mesh, material, displacement);
+            self.meshes.insert(key.clone(), Arc::new(mesh));
+        }
+        Ok(self.meshes.get(&key).map_or(plain, Arc::clone))
     }
 
     /// The parts of a glTF object, whose materials are added to `materials` the first time; only its camera if the object
     /// has a material of the scene.
-    fn model(&mut self, scene: &Scene, object: &ObjectKeys, materials: &mut Vec<Material>) -> Result<Arc<Parts>> {
+    fn model(&mut self, scene: &Scene, object: &Spanned<ObjectKeys>, materials: &mut Vec<Material>) -> Result<Arc<Parts>> {
+        let (at, object) = (object.span(), object.get_ref());
         let name = object.mesh.as_ref().map_or("", |file| file.get_ref());
         let key = format!("{name} {}", object.uv.as_ref().map_or("", |uv| uv.get_ref()));
         if let Some(parts) = self.models.get(&key) {
             return Ok(Arc::clone(parts));
         }
-        let file = gltf::read(&scene.folder.join(name))?;
+        let path = scene.folder.join(name);
+        let file = gltf::read(&path)?;
         if object.material.is_some() {
             return Ok(Arc::new(Parts { primitives: Vec::new(), camera: file.camera }));
         }
         let first = materials.len();
-        materials.extend(file.materials.into_iter().map(|m| Material { model: Model::Ggx(m.ggx()), name: m.name }));
+        materials.extend(gltf::shaded(&path, &file.materials)?);
         let mut primitives = Vec::new();
         for mut primitive in file.primitives {
             project(&mut primitive.mesh, scene, object)?;
-            primitives.push((Arc::new(primitive.mesh), first + primitive.material));
+            let material = first + primitive.material;
+            if let Some(m) = materials.get(material) {
+                maps::fits(&primitive.mesh, m, None).map_err(|lack| unfit(scene, &at, m, lack))?;
+                maps::prepare(&mut primitive.mesh, m, None);
+            }
+            primitives.push((Arc::new(primitive.mesh), material));
         }
         let parts = Arc::new(Parts { primitives, camera: file.camera });
         self.models.insert(key, Arc::clone(&parts));
         Ok(parts)
     }
+}
+
+/// That an object's mesh lacks what the textures of its material need.
+fn unfit(scene: &Scene, at: &Span, material: &Material, lack: &str) -> Error {
+    let expected = format!("a mesh with texture coordinates, or `uv`, for the maps of material `{}`", material.name);
+    scene.source.error(at, expected, lack)
 }
 
 /// Gives a mesh the texture coordinates that its object asks for, in the place of its own.
