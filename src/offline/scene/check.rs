@@ -90,6 +90,10 @@ impl Check<'_> {
             c.extension(&plain, &["obj", "ply", "off", "glb", "gltf"]).map(drop)
         })?;
         self.each(&o.builtin, |c, v| c.name(v, &builtin::MESHES))?;
+        self.each(&o.detail, |c, v| {
+            c.require(o.builtin.is_some(), &v.span(), "a builtin beside it", "none")?;
+            c.require((8..=4096).contains(v.get_ref()), &v.span(), "8 to 4096 segments", v.get_ref())
+        })?;
         match &o.material {
             None if o.is_gltf() => {}
             None => return Err(self.source.missing(&object.span(), "material", "a name, unless the mesh is glTF")),

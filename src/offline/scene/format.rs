@@ -68,6 +68,7 @@ pub(super) struct Light {
 pub(super) struct Object {
     pub mesh: Key<String>,
     pub builtin: Key<String>,
+    pub detail: Key<u32>,
     pub material: Key<String>,
     pub uv: Key<String>,
     pub translate: Key<Vector>,

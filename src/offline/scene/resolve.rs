@@ -108,11 +108,12 @@ impl Known {
     /// The whole mesh of an object, as its material wants it.
     fn mesh(&mut self, scene: &Scene, object: &ObjectKeys, (index, material): (usize, Option<&Material>)) -> Result<Arc<Mesh>> {
         let name = |key: &Option<Spanned<String>>| key.as_ref().map_or(String::new(), |name| name.get_ref().clone());
-        let key = format!("{} {} {}", name(&object.mesh), name(&object.builtin), name(&object.uv));
+        let detail = object.detail.as_ref().map_or(builtin::DEFAULT_DETAIL, |d| *d.get_ref());
+        let key = format!("{} {} {} {detail}", name(&object.mesh), name(&object.builtin), name(&object.uv));
         if !self.meshes.contains_key(&key) {
             let mut mesh = match &object.mesh {
                 Some(file) => mesh::read(&scene.folder.join(file.get_ref()))?,
-                None => builtin::mesh(&name(&object.builtin), builtin::DEFAULT_DETAIL)?,
+                None => builtin::mesh(&name(&object.builtin), detail)?,
             };
             project(&mut mesh, scene, object)?;
             self.meshes.insert(key.clone(), Arc::new(mesh));
