@@ -41,7 +41,7 @@ fn camera(position: DVec3) -> Camera {
 /// The covered samples of one validated frame of `objects` (mesh, transform, material).
 fn render(camera: Camera, objects: Vec<(Mesh, Mat4, usize)>) -> Vec<Sample> {
     let config = Config { directions: 2, curvature: true, ..Config::new(EXTENT) };
-    let material = |i: i32| Material { name: format!("{i}"), model: common::rig::grey() };
+    let material = |i: i32| Material { name: format!("{i}"), model: common::rig::grey(), maps: Default::default() };
     let world = World {
         name: "test".into(),
         camera,
