@@ -85,6 +85,7 @@ fn keys_that_work() {
         ("material", "height_map = 'a.PNG'\nheight_scale = -0.1\ndisplace = true\nnormal_map = 'n.png'"),
         ("material", "normal_map = 'n.png'\nnormal_encoding = 'auto'\nnormal_y = 'down'"),
         ("material", "roughness_map = 'n.png'\nroughness = 'kappa'"),
+        ("material", "albedo_map = 'builtin:checker'\nnormal_map = 'builtin:cloth'\nroughness_map = 'builtin:cloth'"),
     ];
     for (mark, text) in lines {
         load_text(&with(mark, text), &[]).unwrap_or_else(|e| panic!("{text}: {e}"));
@@ -208,6 +209,10 @@ fn values_are_checked() {
         ("material", "height_map = 'x.png'\nheight_scale = inf", 14, "height_scale"),
         ("material", "height_map = 'x.png'\nnormal_map = 'x.png'", 13, "displace = true"),
         ("material", "displace = true", 13, "height_map"),
+        ("material", "albedo_map = 'builtin:bumps'", 13, "checker"),
+        ("material", "normal_map = 'builtin:fog'", 13, "dunes"),
+        ("material", "height_map = 'builtin:bumps'", 13, ".png"),
+        ("material", "roughness_map = 'builtin:bumps'\nroughness = 'alpha'", 14, "kappa"),
         ("material", "roughness = 'alpha'", 13, "roughness_map"),
         ("material", "[settings]\noperator = 'sphere'", 14, "settings.operator"),
         ("material", "[settings]\neps = 1.5", 14, "settings.eps"),
@@ -414,7 +419,10 @@ fn files_are_relative_to_the_scene_and_named_when_missing() {
 #[test]
 fn builtin_scenes_resolve() {
     let names = Scene::builtin_names();
-    assert_eq!(names.iter().map(|n| n.0).collect::<Vec<_>>(), ["trio", "sphere", "bumpy-sphere", "torus-knot", "furnace"]);
+    assert_eq!(
+        names.iter().map(|n| n.0).collect::<Vec<_>>(),
+        ["trio", "sphere", "bumpy-sphere", "torus-knot", "maps", "furnace"]
+    );
     for (name, line) in names {
         assert!(line.len() > 20 && line.ends_with('.'), "{name}: {line}");
         let world: World = Scene::load(name, &[]).unwrap().resolve().unwrap();
@@ -425,7 +433,7 @@ fn builtin_scenes_resolve() {
     let trio = Scene::load("trio", &[("objects.2.material".into(), "paint".into())]).unwrap().resolve().unwrap();
     assert_eq!(trio.materials[trio.objects[2].material].name, "paint");
     // Those that need fetched files parse.
-    for name in ["bunny-city", "dragon", "armadillo"] {
+    for name in ["bunny-city", "dragon", "armadillo", "tiles", "bark"] {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("scenes/{name}.toml"));
         load(&path, &[]).unwrap();
     }

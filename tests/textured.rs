@@ -115,7 +115,8 @@ fn cosine_powers_with_every_map() {
 fn lobes_lie_along_the_tangents() {
     check("vmf", &scene("sphere", cloth(), Maps::default()));
     check("vmf, torus knot", &scene("torus-knot", cloth(), Maps { normal: normals(), ..Maps::default() }));
-    let maps = Maps { albedo: colour8(), specular: colour(), roughness: roughness(Roughness::Alpha, 0.15, 0.5), ..Maps::default() };
+    let maps =
+        Maps { albedo: colour8(), specular: colour(), roughness: roughness(Roughness::Alpha, 0.15, 0.5), ..Maps::default() };
     check("vmf, all maps", &scene("sphere", cloth(), maps));
 }
 

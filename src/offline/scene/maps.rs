@@ -8,7 +8,7 @@ use crate::offline::scene::Scene;
 use crate::offline::scene::check::{Check, span};
 use crate::offline::scene::format::{Key, Material as Keys};
 use crate::offline::scene::source::Span;
-use crate::offline::texture::{self, Encoding, Heights, Image};
+use crate::offline::texture::{self, Encoding, Heights, Image, Part};
 use crate::offline::world::Material;
 use crate::reflectance::{Model, Reflectance};
 use crate::texture::Texture;
@@ -18,11 +18,29 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use toml::Spanned;
 
+/// What the names of textures by formula begin with.
+const BUILTIN: &str = "builtin:";
+
 impl Check<'_> {
     pub(super) fn maps(&mut self, m: &Keys) -> Result<()> {
-        for map in [&m.albedo_map, &m.specular_map, &m.normal_map, &m.height_map, &m.roughness_map] {
-            self.each(map, |c, v| c.extension(v, &texture::EXTENSIONS).map(drop))?;
+        let maps = [
+            (&m.albedo_map, &texture::COLOURS[..]),
+            (&m.specular_map, &texture::COLOURS),
+            (&m.normal_map, &texture::MAPS),
+            (&m.height_map, &[]),
+            (&m.roughness_map, &texture::MAPS),
+        ];
+        for (map, builtins) in maps {
+            self.each(map, |c, v| match v.get_ref().strip_prefix(BUILTIN) {
+                Some(name) if !builtins.is_empty() => c.name(&Spanned::new(v.span(), name.to_string()), builtins),
+                _ => c.extension(v, &texture::EXTENSIONS).map(drop),
+            })?;
         }
+        let concentrations = m.roughness_map.as_ref().is_some_and(|v| v.get_ref().starts_with(BUILTIN));
+        self.each(&m.roughness, |c, v| {
+            let fits = !concentrations || v.get_ref() != "alpha";
+            c.require(fits, &v.span(), "kappa, as built-in maps hold concentrations", "alpha")
+        })?;
         self.each(&m.height_scale, |c, v| c.number(v, "a finite number", |_| true))?;
         self.each(&m.roughness, |c, v| c.name(v, &["alpha", "kappa"]))?;
         self.each(&m.normal_encoding, |c, v| c.name(v, &["auto", "unit", "signed"]))?;
@@ -79,10 +97,11 @@ impl Textures {
     pub fn of(&mut self, scene: &Scene, keys: &Keys, model: &Model) -> Result<(Maps, Option<Displacement>)> {
         let tiling = keys.tiling.as_ref().map_or([1.0; 2], |v| *v.get_ref());
         let mut maps = Maps { tiling: tiling.map(|t| t as f32), ..Maps::default() };
-        maps.albedo = self.optional(scene, &keys.albedo_map, "colour", Image::colour)?;
-        maps.specular = self.optional(scene, &keys.specular_map, "colour", Image::colour)?;
-        let roughness = self.optional(scene, &keys.roughness_map, "roughness", Image::roughness)?;
-        let kind = if is(&keys.roughness, "kappa") { Roughness::Kappa } else { Roughness::Alpha };
+        maps.albedo = self.optional(scene, &keys.albedo_map, Part::Colour, "colour", Image::colour)?;
+        maps.specular = self.optional(scene, &keys.specular_map, Part::Colour, "colour", Image::colour)?;
+        let roughness = self.optional(scene, &keys.roughness_map, Part::Concentration, "roughness", Image::roughness)?;
+        let builtin = keys.roughness_map.as_ref().is_some_and(|v| v.get_ref().starts_with(BUILTIN));
+        let kind = if builtin || is(&keys.roughness, "kappa") { Roughness::Kappa } else { Roughness::Alpha };
         maps.roughness = roughness.map(|map| (map, kind));
         let encoding = match &keys.normal_encoding {
             Some(name) if name.get_ref() == "unit" => Encoding::Unit,
@@ -91,17 +110,17 @@ impl Textures {
         };
         let up = !is(&keys.normal_y, "down");
         let use_ = format!("normals {encoding:?} {up}");
-        maps.normal = self.optional(scene, &keys.normal_map, &use_, |image| image.normals(encoding, up, 1.0))?;
+        maps.normal = self.optional(scene, &keys.normal_map, Part::Normal, &use_, |image| image.normals(encoding, up, 1.0))?;
         let mut displacement = None;
         if let Some(file) = &keys.height_map {
             let scale = keys.height_scale.as_ref().map_or(1.0, |v| *v.get_ref());
             if displaces(keys) {
-                let heights = self.image(scene, file)?.heights()?;
+                let heights = self.image(scene, file, Part::Colour)?.heights()?;
                 displacement = Some(Displacement { heights, scale, tiling: DVec2::from(tiling) });
             } else {
                 let path = scene.folder.join(file.get_ref());
                 let normals = |image: &Image| image.heights()?.normals(scale).map_err(|e| texture::refused(&path, e));
-                maps.normal = Some(self.texture(scene, file, &format!("heights {scale}"), normals)?);
+                maps.normal = Some(self.texture(scene, file, Part::Colour, &format!("heights {scale}"), normals)?);
             }
         }
         let material = crate::Material { model: model.clone(), maps };
@@ -113,16 +132,18 @@ impl Textures {
         &mut self,
         scene: &Scene,
         file: &Key<String>,
+        part: Part,
         use_: &str,
         make: impl FnOnce(&Image) -> Result<Texture>,
     ) -> Result<Option<Arc<Texture>>> {
-        file.as_ref().map(|file| self.texture(scene, file, use_, make)).transpose()
+        file.as_ref().map(|file| self.texture(scene, file, part, use_, make)).transpose()
     }
 
     fn texture(
         &mut self,
         scene: &Scene,
         file: &Spanned<String>,
+        part: Part,
         use_: &str,
         make: impl FnOnce(&Image) -> Result<Texture>,
     ) -> Result<Arc<Texture>> {
@@ -130,12 +151,15 @@ impl Textures {
         if let Some(texture) = self.made.get(&key) {
             return Ok(Arc::clone(texture));
         }
-        let texture = Arc::new(make(self.image(scene, file)?.as_ref())?);
+        let texture = Arc::new(make(self.image(scene, file, part)?.as_ref())?);
         self.made.insert(key, Arc::clone(&texture));
         Ok(texture)
     }
 
-    fn image(&mut self, scene: &Scene, file: &Spanned<String>) -> Result<Arc<Image>> {
+    fn image(&mut self, scene: &Scene, file: &Spanned<String>, part: Part) -> Result<Arc<Image>> {
+        if let Some(name) = file.get_ref().strip_prefix(BUILTIN) {
+            return Image::builtin(name, part).map(Arc::new);
+        }
         let path = scene.folder.join(file.get_ref());
         if let Some(image) = self.images.get(&path) {
             return Ok(Arc::clone(image));

@@ -18,12 +18,13 @@ mod source;
 pub use materials::{read_merl, read_rgl, read_sgd};
 
 /// Name and text of the scenes that need no other file.
-const BUILTINS: [(&str, &str); 6] = [
+const BUILTINS: [(&str, &str); 7] = [
     ("trio", include_str!("../../../scenes/trio.toml")),
     ("sphere", include_str!("../../../scenes/sphere.toml")),
     ("bumpy-sphere", include_str!("../../../scenes/bumpy-sphere.toml")),
     ("torus-knot", include_str!("../../../scenes/torus-knot.toml")),
     ("crowd", include_str!("../../../scenes/crowd.toml")),
+    ("maps", include_str!("../../../scenes/maps.toml")),
     ("furnace", include_str!("../../../scenes/furnace.toml")),
 ];
 

@@ -1,6 +1,7 @@
 //! Textures from image files, and what their values mean: colours, normals, roughness, heights.
 
 mod decode;
+mod formulas;
 mod heights;
 
 use crate::offline::error::{At, Error, Result};
@@ -8,6 +9,7 @@ use crate::texture::{Texture, decode_srgb};
 use glam::{DVec2, DVec3, Vec3};
 use std::path::{Path, PathBuf};
 
+pub use formulas::{COLOURS, MAPS, Part};
 pub use heights::Heights;
 
 /// Extensions of the files that [`Image::read`] reads.
