@@ -100,6 +100,21 @@ fn grey_opacity_and_jpeg() {
 }
 
 #[test]
+fn sizes_from_one_texel_to_16384() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.png");
+    for (size, levels) in [([1, 1], 1), ([16384, 1], 15), ([1, 16384], 15)] {
+        image::GrayImage::from_pixel(size[0], size[1], image::Luma([51])).save(&path).unwrap();
+        let image = Image::read(&path).unwrap();
+        for texture in [image.colour().unwrap(), image.roughness().unwrap(), image.heights().unwrap().normals(1.0).unwrap()] {
+            assert_eq!((texture.size(), texture.levels()), (size, levels));
+        }
+        let last = image.roughness().unwrap().sample(dvec2(0.4, 0.2), f64::from(levels as u32)).x;
+        assert!((last - 0.2).abs() < 1e-3, "{last}");
+    }
+}
+
+#[test]
 fn one_normal_map_in_every_encoding() {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name);

@@ -83,6 +83,10 @@ fn colours_average_in_linear_light() {
     let checks = Texture::colour8([2, 2], &[[0; 3], [255; 3], [255; 3], [0; 3]]).unwrap();
     // Half the light is 188 of 255 encoded, not 128.
     assert_eq!(checks.level(1), ([1, 1], &[188, 188, 188, 255][..]));
+    // What is encoded already is kept to the bit.
+    let bytes: Vec<_> = (0..=255).map(|i| [i, 255 - i, i / 2]).collect();
+    let all = Texture::colour8([16, 16], &bytes).unwrap();
+    assert_eq!(all.level(0).1, bytes.iter().flat_map(|[r, g, b]| [*r, *g, *b, 255]).collect::<Vec<_>>());
     let bright = Texture::colour([2, 1], &[[0.0; 3], [1000.0; 3]]).unwrap();
     assert_eq!(bright.sample(DVec2::ZERO, 1.0).x, 500.0);
     for i in 0..=255 {

@@ -1,6 +1,13 @@
 //! Mips.
 
 use crate::texture::{Format, Level, Texture};
+use std::sync::LazyLock;
+
+/// Linear light of each 8-bit sRGB value.
+static LIGHT: LazyLock<[f32; 256]> = LazyLock::new(|| std::array::from_fn(|i| decode_srgb(i as f64 / 255.0) as f32));
+
+/// Linear light half-way between neighbouring 8-bit sRGB values, as encoded.
+static BETWEEN: LazyLock<[f32; 255]> = LazyLock::new(|| std::array::from_fn(|i| decode_srgb((i as f64 + 0.5) / 255.0) as f32));
 
 /// Linear from sRGB-encoded light, both in [0, 1] (IEC 61966-2-1).
 pub fn decode_srgb(encoded: f64) -> f64 {
@@ -10,6 +17,16 @@ pub fn decode_srgb(encoded: f64) -> f64 {
 /// sRGB-encoded from linear light, both in [0, 1] (IEC 61966-2-1).
 pub fn encode_srgb(linear: f64) -> f64 {
     if linear <= 0.003_130_8 { linear * 12.92 } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 }
+}
+
+/// Linear from 8-bit sRGB-encoded light.
+pub(crate) fn decode_byte(encoded: u8) -> f32 {
+    LIGHT[usize::from(encoded)]
+}
+
+/// The nearest 8-bit sRGB value, as encoded, to linear light.
+pub(super) fn encode_byte(linear: f32) -> u8 {
+    BETWEEN.partition_point(|bound| *bound <= linear) as u8
 }
 
 /// A texture and its mips: each texel of a level is the average of the area that it covers of the level before, whose side

@@ -6,7 +6,8 @@ mod chain;
 pub mod classes;
 
 use crate::error::{Error, Result};
-use chain::chain;
+pub(crate) use chain::decode_byte;
+use chain::{chain, encode_byte};
 use glam::{DVec2, DVec4, dvec4};
 use half::f16;
 
@@ -43,7 +44,7 @@ impl Format {
     fn encode(self, texel: &[f32], out: &mut Vec<u8>) {
         match self {
             Self::Srgb8 => {
-                out.extend(texel.iter().map(|c| (encode_srgb(f64::from(*c)) * 255.0).round() as u8));
+                out.extend(texel.iter().map(|c| encode_byte(*c)));
                 out.push(255);
             }
             Self::Half4 | Self::Half2 | Self::Half1 => {
@@ -87,8 +88,7 @@ impl Texture {
     /// [`Error::InvalidInput`] for a side of 0 or above [`MAX_SIDE`], or another number of texels.
     pub fn colour8(size: [u32; 2], texels: &[[u8; 3]]) -> Result<Self> {
         check(size, texels.len())?;
-        let linear: Vec<_> = (0..=255u8).map(|c| decode_srgb(f64::from(c) / 255.0) as f32).collect();
-        Ok(chain(Format::Srgb8, size, |i| texels[i].map(|c| linear[usize::from(c)])))
+        Ok(chain(Format::Srgb8, size, |i| texels[i].map(decode_byte)))
     }
 
     /// A colour texture of linear texels, row by row from the top; what a 16-bit float cannot hold, or is negative, is

@@ -5,7 +5,7 @@ mod formulas;
 mod heights;
 
 use crate::offline::error::{At, Error, Result};
-use crate::texture::{Texture, decode_srgb};
+use crate::texture::{Texture, decode_byte, decode_srgb};
 use glam::{DVec2, DVec3, Vec3};
 use std::path::{Path, PathBuf};
 
@@ -59,8 +59,11 @@ impl Image {
 
     /// The texel `i` as linear colour: integers are sRGB-encoded.
     pub(crate) fn linear(&self, i: usize) -> Vec3 {
-        let raw = self.raw(i);
-        if matches!(self.samples, Samples::Float(_)) { raw } else { raw.as_dvec3().map(decode_srgb).as_vec3() }
+        match &self.samples {
+            Samples::Bits8(all) => triple(all, i).map(decode_byte).into(),
+            Samples::Bits16(_) => self.raw(i).as_dvec3().map(decode_srgb).as_vec3(),
+            Samples::Float(_) => self.raw(i),
+        }
     }
 
     /// `texel` between texel centres at `uv`, bilinear, repeating; `v` grows upwards.
