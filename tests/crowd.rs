@@ -27,14 +27,16 @@ fn sixty_four_materials_are_each_what_they_are_alone() {
             environment.visible = false;
         }
         let image = Stage::new(&alone, &config).frame([3, 0]);
-        let mut covered = 0;
+        let (mut covered, mut elsewhere) = (0, 0);
         for p in (0..image.texels.len()).filter(|&p| image.coverage(p) > 0.0) {
             covered += 1;
-            // Tables stand elsewhere in the atlases, so that coordinates round otherwise: 2e-4 measured.
+            // Tables stand elsewhere in the atlases, so that coordinates round otherwise: 6e-5 measured. The near plane follows
+            // the objects: where two facets of one meet in depth, one pixel of some materials sees the other.
             let (a, b) = (together.radiance(p), image.radiance(p));
             let off = (a - b).abs().max_element() / b.max_element().max(1e-3);
-            assert!(off < 2e-3, "{} at {p}: {a} together, {b} alone", material.name);
+            elsewhere += usize::from(off > 3e-4);
         }
+        assert!(elsewhere <= 1, "{}: {elsewhere} of {covered} pixels differ", material.name);
         assert!(covered > 50, "{}: {covered} pixels", material.name);
         seen += covered;
     }
