@@ -16,7 +16,7 @@ mod targets;
 mod view;
 
 pub use ash;
-pub use config::{Config, Estimator, GBufferSource};
+pub use config::{Config, Estimator, GBufferSource, Rate};
 pub use error::{Error, Result};
 pub use frame::{EnvironmentUse, FrameInputs, GBufferInput, Output};
 pub use glam;
