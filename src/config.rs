@@ -93,11 +93,12 @@ impl Config {
     /// The coarsest level of shading, in levels over a sample: 0 where every sample is shaded.
     pub(crate) fn coarsest(&self) -> u32 {
         let above = self.samples_per_side.ilog2();
-        match self.rate {
-            Rate::Full => 0,
-            Rate::Uniform(level) => level + above,
-            Rate::Given => (self.lmax + above).min(MAX_LEVEL),
-        }
+        let level = match self.rate {
+            Rate::Full => return 0,
+            Rate::Uniform(level) => level,
+            Rate::Given => self.lmax,
+        };
+        level.saturating_add(above).min(MAX_LEVEL)
     }
 
     pub(crate) fn validate(&self) -> Result<()> {
@@ -116,7 +117,7 @@ impl Config {
         check((1..=8).contains(&self.frames_in_flight), "frames_in_flight", "1 to 8", self.frames_in_flight.to_string())?;
         let above = side.ilog2();
         if let Rate::Uniform(level) = self.rate {
-            check(level + above <= MAX_LEVEL, "rate", &format!("a level up to {}", MAX_LEVEL - above), format!("{level}"))?;
+            check(level <= MAX_LEVEL - above, "rate", &format!("a level up to {}", MAX_LEVEL - above), format!("{level}"))?;
         }
         check(self.lmax <= MAX_LEVEL, "lmax", &format!("0 to {MAX_LEVEL}"), self.lmax.to_string())?;
         let most = self.extent.into_iter().max().unwrap_or_default() * side;

@@ -76,7 +76,16 @@ pub struct FrameInputs<'a> {
 impl<'a> FrameInputs<'a> {
     /// A frame under the environment as it is, with no other light and no output but the renderer's own.
     pub fn new(slot: usize, view: View, gbuffer: GBufferInput<'a>) -> Self {
-        Self { slot, view, gbuffer, environment: EnvironmentUse::default(), lights: &[], levels: None, seed: [0, 0], output: None }
+        Self {
+            slot,
+            view,
+            gbuffer,
+            environment: EnvironmentUse::default(),
+            lights: &[],
+            levels: None,
+            seed: [0, 0],
+            output: None,
+        }
     }
 
     /// Refuses what cannot be recorded with `config` on `shading` samples.

@@ -20,12 +20,8 @@ pub(crate) fn record(rec: &mut Recorder<'_>, io: &Io<'_>) {
     rec.overwrite(io.level, Access::TRANSFER_WRITE);
     rec.flush();
     let color = vk::ClearColorValue { uint32: [io.value; 4] };
-    let range = vk::ImageSubresourceRange {
-        aspect_mask: io.level.desc.aspect(),
-        level_count: 1,
-        layer_count: 1,
-        ..Default::default()
-    };
+    let range =
+        vk::ImageSubresourceRange { aspect_mask: io.level.desc.aspect(), level_count: 1, layer_count: 1, ..Default::default() };
     let layout = Access::TRANSFER_WRITE.layout;
     // SAFETY: the command buffer is recording outside a render pass; the image was made ready above.
     unsafe { rec.cx.device.cmd_clear_color_image(rec.cmd, io.level.handle, layout, &color, &[range]) };
