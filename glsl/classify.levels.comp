@@ -32,7 +32,7 @@ layout(set = 2, binding = 6, std430) writeonly buffer List {
 };
 
 // Distances from the surface's plane are weighted by a Gaussian of this many footprints of the child.
-const float PLANE = 2.0;
+const float PLANE = 0.5;
 // The valid share of the parents' weight that up-sampling takes.
 const float ACCEPT = 0.5;
 

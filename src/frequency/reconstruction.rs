@@ -6,8 +6,9 @@
 
 use glam::{DMat3, DVec2, DVec3};
 
-/// Distances from the surface's plane are weighted by a Gaussian of this many footprints of the child.
-pub const PLANE: f64 = 2.0;
+/// Distances from the surface's plane are weighted by a Gaussian of this many footprints of the child. Half a footprint instead
+/// of two is worth 1.5 dB on a knot at half the rate and shades 0.4 % more; a quarter adds 0.3 dB and shades 2 % more.
+pub const PLANE: f64 = 0.5;
 /// The valid share of the parents' weight that up-sampling takes.
 pub const ACCEPT: f64 = 0.5;
 
