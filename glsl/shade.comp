@@ -9,6 +9,7 @@
 #include "lights.glsl"
 #include "sobol.glsl"
 #include "list.glsl"
+#include "levels.glsl"
 
 layout(local_size_x = LIST_GROUP) in;
 
@@ -20,6 +21,8 @@ const uint ESTIMATOR_LOOKUP = 3u;
 // Whether the frame has lights beside the environment. Without them their loops are compiled away: some devices run a
 // loop's body once, masked, even for no iteration.
 layout(constant_id = 1) const bool LOCAL_LIGHTS = false;
+// Whether entries are samples that stand for cells of some level, or all samples.
+layout(constant_id = 2) const bool LEVELLED = false;
 
 layout(set = 2, binding = 3, std430) readonly buffer Arguments {
     uint groups_x, groups_y, groups_z;
@@ -32,9 +35,10 @@ layout(set = 2, binding = 5, rgba32f) uniform writeonly image2D radiance;
 layout(set = 2, binding = 6, std430) readonly buffer Lights {
     LightRecord lights[]; // exact ones first
 };
+layout(set = 2, binding = 7, rgba32f) uniform writeonly image2D odd; // of odd levels; `radiance` is of even ones
 
-layout(set = 2, binding = 7) uniform sampler2D normals;  // as the filter pass writes them
-layout(set = 2, binding = 8) uniform usampler2D factors;
+layout(set = 2, binding = 8) uniform sampler2D normals;  // as the filter pass writes them
+layout(set = 2, binding = 9) uniform usampler2D factors;
 
 layout(push_constant) uniform Push {
     uint brdf_samples;
@@ -156,13 +160,28 @@ vec3 lookup(Local f, Material m, uint u) {
     return material_evaluate(m, wi, f.view, normalize(wi + f.view)) * environment_lookup(to_world(f, wi)).rgb;
 }
 
+// Stores the radiance at sample p, which stands for a cell of level l.
+void store(ivec2 p, int l, vec3 value) {
+    if (!LEVELLED) {
+        imageStore(radiance, p, vec4(value, 1.0));
+        return;
+    }
+    ivec2 cell = (p >> l) + ivec2(0, frame.levels[l].w);
+    if ((l & 1) == 0) {
+        imageStore(radiance, cell, vec4(value, 1.0));
+    } else {
+        imageStore(odd, cell, vec4(value, 1.0));
+    }
+}
+
 void main() {
     uint index = list_index();
     if (index >= arguments.count) {
         return;
     }
     uint entry = list[index];
-    ivec2 p = ivec2(entry & 0xffffu, entry >> 16);
+    ivec2 p = LEVELLED ? list_sample(entry) : ivec2(entry & 0xffffu, entry >> 16);
+    int l = LEVELLED ? list_level(entry) : 0;
     vec3 ray = frame_ray(p);
     vec4 normal = texelFetch(normals, p, 0);
     Local f = local_frame(normal.xyz, -normalize(ray));
@@ -170,13 +189,13 @@ void main() {
     Material m = material_load(gbuffer_material(p), f.view.z, tangent_turn(f, tangent_decode(normal.xyz, normal.w)),
         factors_unpack(texelFetch(factors, p, 0)));
 
-    uint seed = hash(entry ^ hash(frame.sampling.x ^ hash(frame.sampling.y)));
+    uint seed = hash((uint(p.y) << 16 | uint(p.x)) ^ hash(frame.sampling.x ^ hash(frame.sampling.y)));
     vec3 sum = vec3(0.0);
     if (ESTIMATOR == ESTIMATOR_LOOKUP) {
         for (uint i = 0u; i < push.brdf_samples; ++i) {
             sum += lookup(f, m, hash(seed + i));
         }
-        imageStore(radiance, p, vec4(sum, 1.0));
+        store(p, l, sum);
         return;
     }
     uvec2 seeds = sobol_seeds(seed);
@@ -198,5 +217,5 @@ void main() {
     if (LOCAL_LIGHTS) {
         sum += exact_lights(f, m, at);
     }
-    imageStore(radiance, p, vec4(sum, 1.0));
+    store(p, l, sum);
 }

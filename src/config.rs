@@ -19,6 +19,19 @@ pub enum Estimator {
     Lookup,
 }
 
+/// Where samples are shaded. Levels are of output pixels: 0 is a pixel, +1 is 2x2 coarser; the samples of a pixel are at
+/// negative ones. Every sample that is not shaded is up-sampled from coarser cells.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Rate {
+    /// Every sample.
+    #[default]
+    Full,
+    /// The same level everywhere: 1 is half the pixels a side, 2 a quarter. At most 5 over the level of a sample.
+    Uniform(u32),
+    /// A level for each sample, from [`crate::FrameInputs::levels`].
+    Given,
+}
+
 /// Where the G-buffer comes from.
 #[derive(Clone, Copy, Debug, Default)]
 pub enum GBufferSource {
@@ -32,6 +45,9 @@ pub enum GBufferSource {
     },
 }
 
+/// Levels over a sample that a frame can have.
+pub(crate) const MAX_LEVEL: u32 = 5;
+
 /// Settings of a [`crate::Renderer`].
 #[derive(Clone)]
 pub struct Config {
@@ -43,6 +59,10 @@ pub struct Config {
     pub frames_in_flight: usize,
     /// Estimator.
     pub estimator: Estimator,
+    /// Where samples are shaded.
+    pub rate: Rate,
+    /// Coarsest level of [`Rate::Given`], 0 to 5, in output pixels; no cell is wider than 32 samples.
+    pub lmax: u32,
     /// Directions a shaded sample, 1 to 65536; at least 2 for [`Estimator::Mis`].
     pub directions: u32,
     /// Whether the curvature pass runs (an output of its own until something in the frame reads it).
@@ -61,11 +81,24 @@ impl Config {
             samples_per_side: 1,
             frames_in_flight: 2,
             estimator: Estimator::default(),
+            rate: Rate::default(),
+            lmax: 3,
             directions: 64,
             curvature: false,
             gbuffer: GBufferSource::default(),
             modules: Modules::default(),
         }
+    }
+
+    /// The coarsest level of shading, in levels over a sample: 0 where every sample is shaded.
+    pub(crate) fn coarsest(&self) -> u32 {
+        let above = self.samples_per_side.ilog2();
+        let level = match self.rate {
+            Rate::Full => return 0,
+            Rate::Uniform(level) => level,
+            Rate::Given => self.lmax,
+        };
+        level.saturating_add(above).min(MAX_LEVEL)
     }
 
     pub(crate) fn validate(&self) -> Result<()> {
@@ -82,6 +115,18 @@ impl Config {
             format!("{}x{}", self.extent[0], self.extent[1]),
         )?;
         check((1..=8).contains(&self.frames_in_flight), "frames_in_flight", "1 to 8", self.frames_in_flight.to_string())?;
+        let above = side.ilog2();
+        if let Rate::Uniform(level) = self.rate {
+            check(level <= MAX_LEVEL - above, "rate", &format!("a level up to {}", MAX_LEVEL - above), format!("{level}"))?;
+        }
+        check(self.lmax <= MAX_LEVEL, "lmax", &format!("0 to {MAX_LEVEL}"), self.lmax.to_string())?;
+        let most = self.extent.into_iter().max().unwrap_or_default() * side;
+        check(
+            self.coarsest() == 0 || most <= 16384,
+            "extent",
+            "at most 16384 samples a side where samples are not all shaded",
+            most.to_string(),
+        )?;
         let least = if self.estimator == Estimator::Mis { 2 } else { 1 };
         check((least..=65536).contains(&self.directions), "directions", &format!("{least} to 65536"), self.directions.to_string())
     }

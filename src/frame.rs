@@ -1,11 +1,12 @@
 //! What a host hands over for one frame.
 
-use crate::config::Config;
+use crate::config::{Config, Rate};
 use crate::error::{Error, Result};
 use crate::gpu::access::ImageRef;
 use crate::light::{self, Light};
 use crate::pass::gbuffer::{self, Draw};
 use crate::pass::{FrameUniform, tonemap};
+use crate::plan::Plan;
 use crate::view::View;
 use ash::vk;
 
@@ -62,6 +63,10 @@ pub struct FrameInputs<'a> {
     pub environment: EnvironmentUse,
     /// Lights beside it, at most [`MAX_LIGHTS`](crate::light::MAX_LIGHTS).
     pub lights: &'a [Light],
+    /// For [`crate::Rate::Given`]: the level of each sample, in levels over a sample (0 is finest), in an image of
+    /// `R8_UINT` and of the samples' extent, sampled between its entry and exit. Coarser than the configuration's coarsest
+    /// counts as that.
+    pub levels: Option<ImageRef>,
     /// Seed and frame number of the sample points.
     pub seed: [u32; 2],
     /// The host's image; `None` leaves the result in the renderer's own.
@@ -71,7 +76,16 @@ pub struct FrameInputs<'a> {
 impl<'a> FrameInputs<'a> {
     /// A frame under the environment as it is, with no other light and no output but the renderer's own.
     pub fn new(slot: usize, view: View, gbuffer: GBufferInput<'a>) -> Self {
-        Self { slot, view, gbuffer, environment: EnvironmentUse::default(), lights: &[], seed: [0, 0], output: None }
+        Self {
+            slot,
+            view,
+            gbuffer,
+            environment: EnvironmentUse::default(),
+            lights: &[],
+            levels: None,
+            seed: [0, 0],
+            output: None,
+        }
     }
 
     /// Refuses what cannot be recorded with `config` on `shading` samples.
@@ -97,6 +111,18 @@ impl<'a> FrameInputs<'a> {
                 }
             }
         }
+        match (&self.levels, config.rate) {
+            (Some(image), Rate::Given) => {
+                let got = (image.format, image.extent);
+                let expected = (vk::Format::R8_UINT, shading);
+                if got != expected {
+                    return Err(Error::invalid("levels", format!("{expected:?}"), format!("{got:?}")));
+                }
+            }
+            (None, Rate::Given) => return Err(Error::invalid("levels", "an image, as the rate is Given", "none")),
+            (Some(_), rate) => return Err(Error::invalid("levels", format!("none, as the rate is {rate:?}"), "an image")),
+            (None, _) => {}
+        }
         match &self.output {
             Some(output) => tonemap::check(&output.image, output.transfer, config.extent),
             None => Ok(()),
@@ -104,8 +130,9 @@ impl<'a> FrameInputs<'a> {
     }
 
     /// What the shaders know of the frame; `exact` and `area` count the lights.
-    pub(crate) fn uniform(&self, config: &Config, shading: [u32; 2], [exact, area]: [u32; 2]) -> FrameUniform {
+    pub(crate) fn uniform(&self, config: &Config, plan: &Plan, [exact, area]: [u32; 2]) -> FrameUniform {
         let world = self.view.world_from_view();
+        let shading = plan.shading;
         let EnvironmentUse { intensity, rotation, visible } = self.environment;
         FrameUniform {
             world_from_view: [world.x_axis, world.y_axis, world.z_axis].map(|c| c.to_array()),
@@ -116,6 +143,7 @@ impl<'a> FrameInputs<'a> {
             // A turn about +Y moves the map towards smaller u.
             environment: [-rotation / 360.0, intensity, 0.0, 0.0],
             lights: [exact, area, 0, 0],
+            levels: plan.levels.uniform(),
         }
     }
 }

@@ -3,6 +3,7 @@
 pub mod config;
 pub mod error;
 mod frame;
+pub mod frequency;
 pub mod gpu;
 pub mod light;
 pub mod material;
@@ -18,7 +19,7 @@ pub mod texture;
 mod view;
 
 pub use ash;
-pub use config::{Config, Estimator, GBufferSource};
+pub use config::{Config, Estimator, GBufferSource, Rate};
 pub use error::{Error, Result};
 pub use frame::{EnvironmentUse, FrameInputs, GBufferInput, Output};
 pub use glam;

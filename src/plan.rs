@@ -1,6 +1,6 @@
 //! The frame's arithmetic: extents, image descriptions, memory footprint. No GPU.
 
-use crate::config::{Config, GBufferSource};
+use crate::config::{Config, GBufferSource, MAX_LEVEL, Rate};
 use crate::gpu::image::ImageDesc;
 use crate::light::{LightRecord, MAX_LIGHTS};
 use ash::vk;
@@ -15,7 +15,13 @@ pub(crate) struct Plan {
     pub normals: ImageDesc,
     pub factors: ImageDesc,
     pub curvature: Option<ImageDesc>,
+    pub levels: Levels,
+    /// The level of each sample, where the renderer itself writes it.
+    pub level: Option<ImageDesc>,
+    /// Linear radiance: of samples, and below them of cells of even levels.
     pub radiance: ImageDesc,
+    /// Linear radiance of cells of odd levels, one level below another.
+    pub odd: Option<ImageDesc>,
     pub resolved: ImageDesc,
 }
 
@@ -42,6 +48,56 @@ impl Footprint {
     }
 }
 
+/// Levels of shading over the samples, level 0 (`glsl/include/levels.glsl`): a cell of level l is 2^l x 2^l samples.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct Levels {
+    /// Coarsest level, at most [`MAX_LEVEL`].
+    pub top: u32,
+    /// Cells across and down of levels 0 to `top`.
+    pub extents: Vec<[u32; 2]>,
+}
+
+impl Levels {
+    fn of(config: &Config, shading: [u32; 2]) -> Self {
+        let top = config.coarsest();
+        Self { top, extents: (0..=top).map(|l| shading.map(|e| e.div_ceil(1 << l))).collect() }
+    }
+
+    /// Cells of all levels above 0 and below `level`.
+    pub fn cells_below(&self, level: u32) -> u64 {
+        self.extents.iter().take(level as usize).skip(1).map(|[w, h]| u64::from(*w) * u64::from(*h)).sum()
+    }
+
+    /// Cells of all levels above 0.
+    pub fn cells(&self) -> u64 {
+        self.cells_below(self.top + 1)
+    }
+
+    /// Rows of values of the levels below `level` in the same image: even levels share one, odd ones the other.
+    fn rows_below(&self, level: u32) -> u32 {
+        let rows = (0u32..).zip(&self.extents);
+        rows.filter(|(l, _)| *l < level && l % 2 == level % 2).map(|(_, [_, h])| h).sum()
+    }
+
+    /// Of each level: cells across and down, its first cell, its first row of values.
+    pub fn uniform(&self) -> [[i32; 4]; MAX_LEVEL as usize + 1] {
+        let mut all = [[0; 4]; MAX_LEVEL as usize + 1];
+        for ((l, [w, h]), level) in (0u32..).zip(&self.extents).zip(&mut all) {
+            *level = [*w as i32, *h as i32, self.cells_below(l) as i32, self.rows_below(l) as i32];
+        }
+        all
+    }
+}
+
+/// Bytes of a cell of a level above 0: its word and its depth.
+pub(crate) const CELL_BYTES: u64 = 8;
+/// Bytes of a block: its cell and what its children are.
+pub(crate) const BLOCK_BYTES: u64 = 8;
+/// Bytes of a block's weights.
+pub(crate) const WEIGHT_BYTES: u64 = 16;
+/// Bytes of the arguments of the dispatches over all blocks and over those of each level.
+pub(crate) const BLOCK_ARGUMENT_BYTES: u64 = (MAX_LEVEL as u64 + 1) * ARGUMENT_BYTES;
+
 /// Bytes of the arguments of the indirect dispatch: groups in x, y, z and the number of listed samples.
 pub(crate) const ARGUMENT_BYTES: u64 = 16;
 
@@ -55,6 +111,10 @@ impl Plan {
         let sampled = vk::ImageUsageFlags::SAMPLED | vk::ImageUsageFlags::TRANSFER_SRC;
         let target = sampled | vk::ImageUsageFlags::COLOR_ATTACHMENT;
         let storage = sampled | vk::ImageUsageFlags::STORAGE;
+        let levels = Levels::of(config, shading);
+        // Above the coarsest level, so that all of them are below.
+        let (even_rows, odd_rows) = (levels.rows_below(MAX_LEVEL + 1), levels.rows_below(MAX_LEVEL + 2));
+        let values = |name, width, rows| image(name, vk::Format::R32G32B32A32_SFLOAT, [width, rows], storage);
         let own = matches!(config.gbuffer, GBufferSource::Draws);
         Self {
             shading,
@@ -70,14 +130,31 @@ impl Plan {
             normals: image("normals", vk::Format::R32G32B32A32_SFLOAT, shading, storage),
             factors: image("factors", vk::Format::R32G32B32A32_UINT, shading, storage),
             curvature: config.curvature.then(|| image("curvature", vk::Format::R16G16B16A16_SFLOAT, shading, storage)),
-            radiance: image("radiance", vk::Format::R32G32B32A32_SFLOAT, shading, storage),
+            level: (levels.top > 0 && config.rate != Rate::Given)
+                .then(|| image("level", vk::Format::R32_UINT, shading, sampled | vk::ImageUsageFlags::TRANSFER_DST)),
+            radiance: values("radiance", shading[0], even_rows),
+            odd: (levels.top > 0).then(|| values("odd", shading[0].div_ceil(2), odd_rows)),
+            levels,
             resolved: image("resolved", vk::Format::R32G32B32A32_SFLOAT, config.extent, storage),
         }
     }
 
     fn images(&self) -> impl Iterator<Item = &ImageDesc> {
-        let all = [&self.normals, &self.factors, &self.radiance, &self.resolved];
-        self.gbuffer.iter().flatten().chain(&self.curvature).chain(all)
+        let values = self.level.iter().chain(&self.odd).chain([&self.normals, &self.factors, &self.radiance, &self.resolved]);
+        self.gbuffer.iter().flatten().chain(&self.curvature).chain(values)
+    }
+
+    /// Name and bytes of the buffers over cells, none where every sample is shaded.
+    pub fn cell_buffers(&self) -> [(&'static str, u64); 4] {
+        let cells = self.levels.cells();
+        let arguments = if cells > 0 { BLOCK_ARGUMENT_BYTES } else { 0 };
+        let [cell, block, weight] = [CELL_BYTES, BLOCK_BYTES, WEIGHT_BYTES].map(|bytes| bytes * cells);
+        [("cells", cell), ("blocks", block), ("weights", weight), ("block arguments", arguments)]
+    }
+
+    /// The largest storage buffer.
+    pub fn largest_buffer(&self) -> u64 {
+        self.cell_buffers().into_iter().map(|(_, bytes)| bytes).fold(self.list_bytes(), u64::max)
     }
 
     /// Bytes of the list of samples to shade.
@@ -123,6 +200,7 @@ pub fn memory_footprint(config: &Config) -> Footprint {
     let plan = Plan::of(config);
     let mut rows: Vec<_> = plan.images().map(|d| FootprintRow { name: d.name, bytes: d.bytes() }).collect();
     rows.push(FootprintRow { name: "list", bytes: plan.list_bytes() });
+    rows.extend(plan.cell_buffers().into_iter().filter(|b| b.1 > 0).map(|(name, bytes)| FootprintRow { name, bytes }));
     rows.push(FootprintRow { name: "arguments", bytes: ARGUMENT_BYTES });
     rows.push(FootprintRow {
         name: "frame",
@@ -148,7 +226,7 @@ mod tests {
         let fine = Config { samples_per_side: 4, ..base.clone() };
         assert_eq!(list(&memory_footprint(&fine)), Some(16 * 4 * pixels));
         // surface, coordinate, derivative, normals, factors, radiance 16 bytes; ids, depth, list 4; resolved 16
-        assert_eq!(memory_footprint(&base).total(), pixels * (6 * 16 + 3 * 4 + 16) + 16 + 16 + 2 * (144 + 256 * 64));
+        assert_eq!(memory_footprint(&base).total(), pixels * (6 * 16 + 3 * 4 + 16) + 16 + 16 + 2 * (240 + 256 * 64));
     }
 
     #[test]

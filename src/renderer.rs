@@ -19,7 +19,7 @@ use crate::material::Material;
 use crate::pass::environment::{EnvironmentImages, EnvironmentUpload};
 use crate::pass::gbuffer::{self, GBuffer};
 use crate::pass::materials::{MaterialBridge, MaterialImages, MaterialsUpload};
-use crate::pass::{FrameUniform, PassContext, classify, curvature, filter, resolve, shade, tonemap};
+use crate::pass::{FrameUniform, PassContext, classify, curvature, filter, level, pyramid, resolve, shade, tonemap, upsample};
 use crate::plan::{Directions, LIGHT_BYTES};
 use crate::sampling::LatLong;
 use crate::targets::Targets;
@@ -29,8 +29,10 @@ use ash::vk;
 struct Passes {
     gbuffer: Option<GBuffer>,
     curvature: Option<curvature::Curvature>,
+    pyramid: Option<pyramid::Pyramid>,
     classify: classify::Classify,
     shade: shade::Shade,
+    upsample: Option<upsample::Upsample>,
     resolve: resolve::Resolve,
     tonemap: tonemap::Tonemap,
 }
@@ -195,7 +197,7 @@ impl Renderer {
         }
         let (records, counts) = light::records(inputs.lights);
         let [exact, area] = counts;
-        let uniform = inputs.uniform(&self.config, self.targets.plan.shading, counts);
+        let uniform = inputs.uniform(&self.config, &self.targets.plan, counts);
         self.uniforms[inputs.slot].bytes_mut().copy_from_slice(bytemuck::bytes_of(&uniform));
         let records: &[u8] = bytemuck::cast_slice(&records);
         self.lights[inputs.slot].bytes_mut()[..records.len()].copy_from_slice(records);
@@ -224,9 +226,32 @@ impl Renderer {
             pass.record(rec, &curvature::Io { frame, bridge, samplers, normals, curvature });
         }
 
+        // 4  The level of every sample: the same, or the host's.
+        let shading = targets.plan.shading;
+        let level = match (&targets.level, &inputs.levels) {
+            (Some(level), _) => {
+                level::record(rec, &level::Io { level, value: targets.plan.levels.top });
+                rec.image(level, Access::COMPUTE_SAMPLED);
+                Some(level.view)
+            }
+            (None, Some(image)) => {
+                rec.host_image(image, Access::COMPUTE_SAMPLED);
+                Some(image.view)
+            }
+            (None, None) => None,
+        };
+
+        // 5  Their cells.
+        let mut from = classify::From::Samples(shading);
+        if let (Some(pass), Some(buffers), Some(view)) = (&passes.pyramid, &targets.cells, level) {
+            let cells = buffers.cells();
+            pass.record(rec, &pyramid::Io { frame, bridge, level: (view, samplers.nearest), shading, cells });
+            from = classify::From::Cells(cells, &buffers.weights);
+        }
+
         // 6  Which samples to shade.
         let (arguments, list) = (&targets.arguments, &targets.list);
-        passes.classify.record(rec, &classify::Io { frame, bridge, shading: targets.plan.shading, arguments, list });
+        passes.classify.record(rec, &classify::Io { frame, bridge, from, arguments, list });
 
         // 8  Their radiance.
         let radiance = &targets.radiance;
@@ -247,8 +272,13 @@ impl Renderer {
                 light_count: exact + area,
                 directions,
                 radiance,
+                odd: targets.odd.as_ref(),
             },
         );
+        if let (Some(pass), Some(buffers), Some(odd)) = (&passes.upsample, &targets.cells, &targets.odd) {
+            let (cells, weights, values) = (buffers.cells(), &buffers.weights, [radiance, odd]);
+            pass.record(rec, &upsample::Io { frame, samplers, cells, weights, values });
+        }
 
         // 9  The output.
         let resolved = &targets.resolved;
@@ -259,6 +289,9 @@ impl Renderer {
         }
         if let GBufferInput::Host { images, .. } = inputs.gbuffer {
             images.iter().for_each(|image| rec.release(image));
+        }
+        if let Some(image) = &inputs.levels {
+            rec.release(image);
         }
         self.pass_bytes = std::mem::take(&mut rec.pass_bytes);
         Ok(())
@@ -319,10 +352,10 @@ impl Renderer {
         self.targets.image(name)
     }
 
-    /// The number of samples to shade and the arguments of their dispatch.
+    /// One of the renderer's own buffers of the last frame, by name.
     #[cfg(feature = "offline")]
-    pub(crate) fn arguments(&self) -> &Buffer {
-        &self.targets.arguments
+    pub(crate) fn buffer(&self, name: &str) -> Option<&Buffer> {
+        self.targets.buffer(name)
     }
 
     /// Records a [`probe`](crate::pass::probe) module over the current materials and environment, at this frame's environment use.
@@ -337,13 +370,19 @@ impl Renderer {
         let (Some(environment), Some((materials, _))) = (&self.environment, &self.materials) else {
             return Err(Error::CallOrder { called: "record_probe", before: "record_environment and record_materials" });
         };
-        let uniform = inputs.uniform(&self.config, self.targets.plan.shading, [0, 0]);
+        let uniform = inputs.uniform(&self.config, &self.targets.plan, [0, 0]);
         self.uniforms[inputs.slot].bytes_mut().copy_from_slice(bytemuck::bytes_of(&uniform));
         let rec = &mut Recorder::new(&self.cx, cmd, inputs.slot, &mut self.states, None);
         let bridge = BridgeSets { materials: self.bridge.write(rec, materials, &self.samplers), ..BridgeSets::NONE };
         let (frame, samplers) = (&self.uniforms[inputs.slot], &self.samplers);
         probe.record(rec, &crate::pass::probe::Io { frame, bridge, samplers, environment, materials, input, count, output });
         Ok(())
+    }
+
+    /// Levels of shading.
+    #[cfg(feature = "offline")]
+    pub(crate) fn levels(&self) -> &crate::plan::Levels {
+        &self.targets.plan.levels
     }
 
     /// Forgets a buffer that is about to be destroyed.
@@ -381,11 +420,14 @@ impl Passes {
             GBufferSource::Host { .. } => None,
         };
         p.bridge.gbuffer = layout(&gbuffer, config);
+        let top = config.coarsest();
         Ok(Self {
             gbuffer,
             curvature: config.curvature.then(|| curvature::Curvature::new(&mut p)).transpose()?,
-            classify: classify::Classify::new(&mut p)?,
-            shade: shade::Shade::new(&mut p, config.estimator)?,
+            pyramid: (top > 0).then(|| pyramid::Pyramid::new(&mut p, top)).transpose()?,
+            classify: classify::Classify::new(&mut p, top)?,
+            shade: shade::Shade::new(&mut p, config.estimator, top > 0)?,
+            upsample: (top > 0).then(|| upsample::Upsample::new(&mut p, top)).transpose()?,
             resolve: resolve::Resolve::new(&mut p)?,
             tonemap: tonemap::Tonemap::new(&mut p)?,
         })
@@ -398,8 +440,14 @@ impl Passes {
         if let Some(pass) = self.curvature {
             pass.retire(bag);
         }
+        if let Some(pass) = self.pyramid {
+            pass.retire(bag);
+        }
         self.classify.retire(bag);
         self.shade.retire(bag);
+        if let Some(pass) = self.upsample {
+            pass.retire(bag);
+        }
         self.resolve.retire(bag);
         self.tonemap.retire(bag);
     }

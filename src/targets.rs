@@ -8,6 +8,7 @@ use crate::gpu::memory::Location;
 use crate::gpu::recorder::States;
 use crate::gpu::retire::{Build, Retired};
 use crate::pass::gbuffer::GBufferImages;
+use crate::pass::pyramid::Cells;
 use crate::plan::{ARGUMENT_BYTES, Plan};
 use ash::vk;
 
@@ -17,7 +18,12 @@ pub(crate) struct Targets {
     pub normals: Image,
     pub factors: Image,
     pub curvature: Option<Image>,
+    /// The level of each sample, where the renderer itself writes it.
+    pub level: Option<Image>,
+    pub cells: Option<CellBuffers>,
     pub radiance: Image,
+    /// Radiance of odd levels.
+    pub odd: Option<Image>,
     pub resolved: Image,
     /// Groups in x, y, z; number of listed samples.
     pub arguments: Buffer,
@@ -25,28 +31,57 @@ pub(crate) struct Targets {
     pub list: Buffer,
 }
 
+/// Buffers over the cells of levels above the samples.
+pub(crate) struct CellBuffers {
+    cells: Buffer,
+    blocks: Buffer,
+    /// Parents' weights of the blocks' children.
+    pub weights: Buffer,
+    arguments: Buffer,
+}
+
+impl CellBuffers {
+    fn new(build: &mut Build<'_>, plan: &Plan) -> Result<Self> {
+        let usage = vk::BufferUsageFlags::STORAGE_BUFFER | vk::BufferUsageFlags::TRANSFER_SRC;
+        let indirect = usage | vk::BufferUsageFlags::INDIRECT_BUFFER | vk::BufferUsageFlags::TRANSFER_DST;
+        let [cells, blocks, weights, arguments] = plan.cell_buffers();
+        let mut buffer = |(name, bytes), usage| Buffer::new(build, name, bytes, usage, Location::Device);
+        Ok(Self {
+            cells: buffer(cells, usage)?,
+            blocks: buffer(blocks, usage)?,
+            weights: buffer(weights, usage)?,
+            arguments: buffer(arguments, indirect)?,
+        })
+    }
+
+    pub fn cells(&self) -> Cells<'_> {
+        Cells { cells: &self.cells, blocks: &self.blocks, arguments: &self.arguments }
+    }
+}
+
 impl Targets {
     pub fn new(build: &mut Build<'_>, config: &Config) -> Result<Self> {
         let plan = Plan::of(config);
         let limit = u64::from(build.cx.limits.max_storage_buffer_range);
-        if plan.list_bytes() > limit {
-            let expected = format!("at most {} shading samples", limit / 4);
-            return Err(crate::Error::invalid("Config::extent", expected, plan.list_bytes() / 4));
+        if plan.largest_buffer() > limit {
+            let samples = plan.list_bytes() / 4;
+            let expected = format!("at most {} shading samples", samples * limit / plan.largest_buffer());
+            return Err(crate::Error::invalid("Config::extent", expected, samples));
         }
-        let storage = vk::BufferUsageFlags::STORAGE_BUFFER;
-        let arguments = storage
-            | vk::BufferUsageFlags::INDIRECT_BUFFER
-            | vk::BufferUsageFlags::TRANSFER_DST
-            | vk::BufferUsageFlags::TRANSFER_SRC;
+        let (storage, source) = (vk::BufferUsageFlags::STORAGE_BUFFER, vk::BufferUsageFlags::TRANSFER_SRC);
+        let arguments = storage | source | vk::BufferUsageFlags::INDIRECT_BUFFER | vk::BufferUsageFlags::TRANSFER_DST;
         Ok(Self {
             gbuffer: plan.gbuffer.map(|images| GBufferImages::new(build, images)).transpose()?,
             normals: Image::new(build, plan.normals)?,
             factors: Image::new(build, plan.factors)?,
             curvature: plan.curvature.map(|desc| Image::new(build, desc)).transpose()?,
+            level: plan.level.map(|desc| Image::new(build, desc)).transpose()?,
+            cells: (plan.levels.top > 0).then(|| CellBuffers::new(build, &plan)).transpose()?,
             radiance: Image::new(build, plan.radiance)?,
+            odd: plan.odd.map(|desc| Image::new(build, desc)).transpose()?,
             resolved: Image::new(build, plan.resolved)?,
             arguments: Buffer::new(build, "arguments", ARGUMENT_BYTES, arguments, Location::Device)?,
-            list: Buffer::new(build, "list", plan.list_bytes(), storage, Location::Device)?,
+            list: Buffer::new(build, "list", plan.list_bytes(), storage | source, Location::Device)?,
             plan,
         })
     }
@@ -55,22 +90,36 @@ impl Targets {
     #[cfg(feature = "offline")]
     pub fn image(&self, name: &str) -> Option<&Image> {
         let gbuffer = self.gbuffer.as_ref().map(GBufferImages::colors);
-        let all = gbuffer.into_iter().flatten().chain(&self.curvature).chain([
-            &self.normals,
-            &self.factors,
-            &self.radiance,
-            &self.resolved,
-        ]);
+        let own = [&self.curvature, &self.level, &self.odd].into_iter().flatten();
+        let always = [&self.normals, &self.factors, &self.radiance, &self.resolved];
+        let all = gbuffer.into_iter().flatten().chain(own).chain(always);
         all.into_iter().find(|image| image.desc.name == name)
+    }
+
+    /// The renderer's own buffers by name.
+    #[cfg(feature = "offline")]
+    pub fn buffer(&self, name: &str) -> Option<&Buffer> {
+        let cells = self.cells.as_ref();
+        match name {
+            "arguments" => Some(&self.arguments),
+            "list" => Some(&self.list),
+            "cells" => cells.map(|c| &c.cells),
+            "blocks" => cells.map(|c| &c.blocks),
+            "weights" => cells.map(|c| &c.weights),
+            "block arguments" => cells.map(|c| &c.arguments),
+            _ => None,
+        }
     }
 
     pub fn retire(self, states: &mut States, bag: &mut Retired) {
         let images = self.gbuffer.into_iter().flat_map(GBufferImages::into_images);
-        for image in images.chain(self.curvature).chain([self.normals, self.factors, self.radiance, self.resolved]) {
+        let own = [self.curvature, self.level, self.odd].into_iter().flatten();
+        for image in images.chain(own).chain([self.normals, self.factors, self.radiance, self.resolved]) {
             states.forget(image.handle);
             image.retire(bag);
         }
-        for buffer in [self.arguments, self.list] {
+        let cells = self.cells.map(|c| [c.cells, c.blocks, c.weights, c.arguments]);
+        for buffer in cells.into_iter().flatten().chain([self.arguments, self.list]) {
             states.forget(buffer.handle);
             buffer.retire(bag);
         }

@@ -10,6 +10,7 @@ layout(set = 2, binding = 0, std140) uniform Frame {
     uvec4 sampling;          // seed, frame, samples a shaded pixel
     vec4 environment;        // rotation in turns, intensity
     uvec4 lights;            // exact lights, then area lights
+    ivec4 levels[6];         // of shading: see levels.glsl
 } frame;
 
 // World vector from the eye through the centre of shading sample p, of length 1 along the view axis.

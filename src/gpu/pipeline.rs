@@ -120,6 +120,8 @@ impl Sets {
 #[derive(Clone, Copy)]
 pub(crate) enum Resource<'a> {
     Sampled(&'a Image, vk::Sampler),
+    /// As `Sampled`, of an image that may be the host's.
+    View(vk::ImageView, vk::Sampler),
     Storage(vk::ImageView),
     Uniform(&'a Buffer),
     Buffer(&'a Buffer),
@@ -132,6 +134,10 @@ pub(crate) fn write_set(device: &ash::Device, set: vk::DescriptorSet, resources:
         .map(|r| match r {
             Resource::Sampled(image, sampler) => vk::DescriptorImageInfo::default()
                 .image_view(image.view)
+                .sampler(*sampler)
+                .image_layout(vk::ImageLayout::SHADER_READ_ONLY_OPTIMAL),
+            Resource::View(view, sampler) => vk::DescriptorImageInfo::default()
+                .image_view(*view)
                 .sampler(*sampler)
                 .image_layout(vk::ImageLayout::SHADER_READ_ONLY_OPTIMAL),
             Resource::Storage(view) => {
@@ -156,7 +162,9 @@ pub(crate) fn write_set(device: &ash::Device, set: vk::DescriptorSet, resources:
             let write = vk::WriteDescriptorSet::default().dst_set(set).dst_binding(binding);
             let (image, buffer) = (std::slice::from_ref(image), std::slice::from_ref(buffer));
             match resource {
-                Resource::Sampled(..) => write.descriptor_type(vk::DescriptorType::COMBINED_IMAGE_SAMPLER).image_info(image),
+                Resource::Sampled(..) | Resource::View(..) => {
+                    write.descriptor_type(vk::DescriptorType::COMBINED_IMAGE_SAMPLER).image_info(image)
+                }
                 Resource::Storage(_) => write.descriptor_type(vk::DescriptorType::STORAGE_IMAGE).image_info(image),
                 Resource::Uniform(_) => write.descriptor_type(vk::DescriptorType::UNIFORM_BUFFER).buffer_info(buffer),
                 Resource::Buffer(_) => write.descriptor_type(vk::DescriptorType::STORAGE_BUFFER).buffer_info(buffer),
@@ -284,10 +292,10 @@ impl ComputePipeline {
         unsafe { rec.cx.device.cmd_dispatch(rec.cmd, extent[0].div_ceil(x), extent[1].div_ceil(y), 1) };
     }
 
-    /// Dispatches what the first three words of `arguments` say.
-    pub fn dispatch_indirect(&self, rec: &Recorder<'_>, arguments: &Buffer) {
-        // SAFETY: `bind` came before; the buffer has indirect usage and at least 12 bytes.
-        unsafe { rec.cx.device.cmd_dispatch_indirect(rec.cmd, arguments.handle, 0) };
+    /// Dispatches what the three words at byte `offset` of `arguments` say.
+    pub fn dispatch_indirect(&self, rec: &Recorder<'_>, arguments: &Buffer, offset: u64) {
+        // SAFETY: `bind` came before; the buffer has indirect usage and at least 12 bytes from `offset` on.
+        unsafe { rec.cx.device.cmd_dispatch_indirect(rec.cmd, arguments.handle, offset) };
     }
 
     pub fn retire(self, bag: &mut Retired) {

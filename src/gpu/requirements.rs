@@ -65,7 +65,7 @@ impl Requirements {
             limits: vec![
                 ("maxImageDimension2D", u64::from(width.max(height)).max(4096)),
                 ("maxImageDimension3D", 256),
-                ("maxStorageBufferRange", plan.list_bytes()),
+                ("maxStorageBufferRange", plan.largest_buffer()),
                 ("maxPushConstantsSize", 128),
                 ("maxBoundDescriptorSets", 3),
                 ("maxColorAttachments", 4),

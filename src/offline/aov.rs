@@ -1,6 +1,7 @@
 //! Layers beside radiance: what the frame's own images hold, at one shading sample an output pixel.
 
 use crate::offline::error::{Error, Result};
+use crate::offline::levels;
 use crate::offline::session::Session;
 
 /// A layer that `--aov` names.
@@ -20,13 +21,17 @@ pub enum Aov {
     Footprint,
     /// Principal curvatures in 1/m, the larger in magnitude first, positive where convex.
     Curvature,
+    /// Level of the coarsest cell around the pixel that has a value: 0 is an output pixel, +1 is 2x2 coarser.
+    Level,
+    /// Valid share of the weight of the sample's parents, in steps of 1/63; 0 where it was shaded without asking them.
+    Weight,
     /// 1 where the sample was shaded by itself.
     Shaded,
     /// Directions drawn for the sample.
     Samples,
 }
 
-const ALL: [(&str, Aov); 9] = [
+const ALL: [(&str, Aov); 11] = [
     ("depth", Aov::Depth),
     ("normal", Aov::Normal),
     ("material", Aov::Material),
@@ -34,10 +39,12 @@ const ALL: [(&str, Aov); 9] = [
     ("uv", Aov::Uv),
     ("footprint", Aov::Footprint),
     ("curvature", Aov::Curvature),
+    ("level", Aov::Level),
+    ("weight", Aov::Weight),
     ("shaded", Aov::Shaded),
     ("samples", Aov::Samples),
 ];
-const LATER: [&str; 6] = ["level", "bandwidth", "spread", "lobes", "mip", "parent-weight"];
+const LATER: [&str; 4] = ["bandwidth", "spread", "lobes", "mip"];
 
 impl std::str::FromStr for Aov {
     type Err = Error;
@@ -80,6 +87,11 @@ impl Pixels {
         Ok(Self { words, components, width: width as usize, side: side as usize, output })
     }
 
+    /// As from an image, from a word of each sample.
+    fn of(&self, words: Vec<u32>) -> Self {
+        Self { words, components: 1, ..*self }
+    }
+
     fn map(&self, f: impl Fn(&[u32]) -> f32) -> Vec<f32> {
         let [width, height] = self.output;
         let at = |x: usize, y: usize| {
@@ -120,8 +132,22 @@ impl Aov {
             Self::Curvature => float("curvature", "XY", 0, session),
             Self::Material => scalar(covered.map(|t| t[0].checked_sub(1).map_or(-1.0, |id| (id & 0xffff) as f32))),
             Self::Object => scalar(covered.map(|t| t[0].checked_sub(1).map_or(-1.0, |id| (id >> 16) as f32))),
-            Self::Shaded => scalar(mask),
-            Self::Samples => scalar(mask.iter().map(|m| m * directions as f32).collect()),
+            Self::Level => {
+                let pixel = side.ilog2() as f32;
+                let levels = covered.of(levels::coarsest(session)?).map(|t| t[0] as f32 - pixel);
+                scalar(levels.iter().zip(mask).map(|(level, mask)| level * mask).collect())
+            }
+            Self::Weight => {
+                let weights = levels::weights(session)?.into_iter().map(f32::to_bits).collect();
+                scalar(covered.of(weights).map(|t| f32::from_bits(t[0])))
+            }
+            Self::Shaded | Self::Samples => {
+                let mut shaded = vec![0; covered.words.len()];
+                for ([x, y], _) in levels::shaded(session)? {
+                    shaded[y as usize * covered.width + x as usize] = if self == Self::Shaded { 1 } else { directions };
+                }
+                scalar(covered.of(shaded).map(|t| t[0] as f32))
+            }
         }
     }
 }

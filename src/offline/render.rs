@@ -5,11 +5,12 @@ use crate::offline::aov::Aov;
 use crate::offline::error::Result;
 use crate::offline::headless::{Headless, Options};
 use crate::offline::image_io::LinearImage;
+use crate::offline::levels;
 use crate::offline::session::Session;
 use crate::offline::stats::{Pixels, Quantiles, Samples, Stats, pass_times};
 use crate::offline::world::World;
 use crate::plan::Directions;
-use crate::{Config, Estimator, Requirements};
+use crate::{Config, Estimator, Rate, Requirements};
 use serde_json::json;
 use std::collections::BTreeMap;
 
@@ -25,6 +26,10 @@ const REFERENCE_CHUNK: u32 = 1024;
 pub struct Settings {
     /// Output pixels.
     pub extent: [u32; 2],
+    /// Where samples are shaded.
+    pub rate: Rate,
+    /// Coarsest level, in output pixels; `None` is the default.
+    pub lmax: Option<u32>,
     /// Directions a shaded sample.
     pub samples: u32,
     /// Estimator.
@@ -45,13 +50,16 @@ pub struct Settings {
 
 impl Settings {
     fn config(&self) -> Config {
+        let base = Config::new(self.extent);
         Config {
             samples_per_side: self.samples_per_side,
             frames_in_flight: 1,
             estimator: if self.reference.is_some() { Estimator::Mis } else { self.estimator },
+            rate: if self.reference.is_some() { Rate::Full } else { self.rate },
+            lmax: self.lmax.unwrap_or(base.lmax),
             directions: self.reference.map_or(self.samples, |n| n.min(REFERENCE_CHUNK)),
             curvature: self.aovs.iter().any(|a| a.needs_curvature()),
-            ..Config::new(self.extent)
+            ..base
         }
     }
 }
@@ -112,7 +120,14 @@ fn statistics(
     session: &mut Session,
     timings: &[FrameTimings],
 ) -> Result<Stats> {
-    let shaded = u64::from(session.shaded()?);
+    let pixel = config.samples_per_side.ilog2() as i32;
+    let mut by_level = BTreeMap::new();
+    for (_, level) in levels::shaded(session)? {
+        *by_level.entry(level as i32 - pixel).or_insert(0) += 1;
+    }
+    let shaded = by_level.values().sum();
+    let (ids, ..) = session.image("ids")?;
+    let covered = ids.chunks_exact(4).filter(|id| id.iter().any(|byte| *byte != 0)).count() as u64;
     let area_lights = world.lights.iter().filter(|l| l.is_area()).count() as u32;
     let shines = world.environment.as_ref().is_some_and(|e| e.intensity > 0.0);
     let taken = shaded * u64::from(Directions::of(config, shines, area_lights).total(area_lights));
@@ -122,8 +137,16 @@ fn statistics(
         Estimator::BrdfRandom => "brdf-random",
         Estimator::Lookup => "lookup",
     };
+    let rate = match config.rate {
+        Rate::Full => "full",
+        Rate::Uniform(1) => "half",
+        Rate::Uniform(2) => "quarter",
+        Rate::Uniform(_) => "uniform",
+        Rate::Given => "given",
+    };
     let values = BTreeMap::from([
-        ("rate", json!("full")),
+        ("rate", json!(rate)),
+        ("lmax", json!(config.lmax)),
         ("filter", json!("point")),
         ("estimator", json!(estimator)),
         ("samples", json!(config.directions)),
@@ -137,7 +160,7 @@ fn statistics(
         scene: world.name.clone(),
         extent: settings.extent,
         settings: values,
-        pixels: Pixels { covered: shaded, shaded, by_level: BTreeMap::from([(0, shaded)]) },
+        pixels: Pixels { covered, shaded, by_level },
         samples: Samples { taken, budget: taken },
         passes: pass_times(timings, session.pass_bytes()),
         frame_ms: Quantiles::of(timings.iter().map(|t| t.span_ms).collect()),

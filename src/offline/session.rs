@@ -1,21 +1,21 @@
 //! A world on a device: uploaded once, rendered frame by frame, read back.
 
-use crate::gpu::access::Access;
+use crate::gpu::access::{Access, ImageRef};
 use crate::gpu::buffer::Buffer;
-use crate::gpu::image::Image;
+use crate::gpu::image::{Image, ImageDesc};
 use crate::gpu::memory::Location;
 use crate::gpu::pipeline::{BridgeLayouts, Modules};
 use crate::gpu::recorder::{Recorder, States};
 use crate::gpu::retire::{Build, Retired};
 use crate::gpu::timer::FrameTimings;
-use crate::gpu::upload::BufferUpload;
+use crate::gpu::upload::{BufferUpload, ImageUpload};
 use crate::offline::error::{Error, Result};
 use crate::offline::headless::Headless;
 use crate::offline::mesh::Mesh;
 use crate::offline::world::{Camera, World};
 use crate::pass::PassContext;
 use crate::pass::probe::Probe;
-use crate::plan::ARGUMENT_BYTES;
+use crate::plan::Levels;
 use crate::renderer::Renderer;
 use crate::sampling::LatLong;
 use crate::{Config, Draw, EnvironmentUse, FrameInputs, GBufferInput, Light, View};
@@ -43,6 +43,7 @@ struct Shown {
     draws: Vec<Draw>,
     environment: EnvironmentUse,
     lights: Vec<Light>,
+    levels: Option<Image>,
 }
 
 impl Shown {
@@ -55,13 +56,28 @@ impl Shown {
             rotation: e.rotation as f32,
             visible: e.visible,
         });
-        Self { view: view(&world.camera, extent, near(world)), draws: Vec::new(), environment, lights: world.lights.clone() }
+        Self {
+            view: view(&world.camera, extent, near(world)),
+            draws: Vec::new(),
+            environment,
+            lights: world.lights.clone(),
+            levels: None,
+        }
     }
 
     fn inputs(&self, seed: [u32; 2]) -> FrameInputs<'_> {
-        let Self { view, draws, environment, lights } = self;
+        let Self { view, draws, environment, lights, levels } = self;
         let frame = FrameInputs::new(0, *view, GBufferInput::Draws(draws));
-        FrameInputs { environment: *environment, lights, seed, ..frame }
+        let levels = levels.as_ref().map(|image| ImageRef {
+            image: image.handle,
+            view: image.view,
+            format: image.desc.format,
+            extent: image.extent(),
+            aspect: image.desc.aspect(),
+            entry: Access::COMPUTE_SAMPLED,
+            exit: Access::COMPUTE_SAMPLED,
+        });
+        FrameInputs { environment: *environment, lights, seed, levels, ..frame }
     }
 }
 
@@ -186,6 +202,38 @@ impl Session {
         })
     }
 
+    /// Gives the frames of [`crate::Rate::Given`] the level of each sample, row by row.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] for another number of samples; the device's.
+    pub fn set_levels(&mut self, levels: &[u8]) -> Result<()> {
+        let renderer = self.renderer.as_mut().ok_or_else(closed)?;
+        let [width, height] = renderer.levels().extents.first().copied().unwrap_or_default();
+        if levels.len() as u64 != u64::from(width) * u64::from(height) {
+            return Err(Error::argument("levels", format!("{width}x{height} samples"), levels.len()));
+        }
+        let usage = vk::ImageUsageFlags::SAMPLED;
+        let desc = ImageDesc::new("levels", vk::Format::R8_UINT, [width, height, 1], usage);
+        let former = self.shown.levels.take();
+        let mut fresh = None;
+        self.headless.submit(|cmd, memory| {
+            let mut bag = Retired::default();
+            if let Some(former) = former {
+                former.retire(&mut bag);
+            }
+            let upload = Build::run(renderer.context(), memory, |build| ImageUpload::new(build, desc, levels))?;
+            let mut states = States::default();
+            let mut rec = Recorder::new(renderer.context(), cmd, 0, &mut states, None);
+            let image = upload.record(&mut rec, &mut bag);
+            rec.image(&image, Access::COMPUTE_SAMPLED);
+            rec.flush();
+            fresh = Some(image);
+            Ok(bag)
+        })?;
+        self.shown.levels = fresh;
+        Ok(())
+    }
+
     /// Runs a compute module of the caller's own over the session's materials and environment: local size 64, set 1 the
     /// material bridge, set 2 the frame uniform, the environment's map and intervals, `uvec4` input and `vec4` output; a
     /// push constant holds the number of entries. Entry i of the result is output i.
@@ -247,6 +295,11 @@ impl Session {
         &self.setup
     }
 
+    /// Levels of shading.
+    pub(crate) fn levels(&self) -> Option<Levels> {
+        self.renderer.as_ref().map(|renderer| renderer.levels().clone())
+    }
+
     /// The device.
     pub fn headless(&self) -> &Headless {
         &self.headless
@@ -257,8 +310,22 @@ impl Session {
     /// # Errors
     /// The device's.
     pub fn shaded(&mut self) -> Result<u32> {
-        let bytes = self.read(ARGUMENT_BYTES, |renderer, rec, target| copy_buffer(rec, renderer.arguments(), target))?;
-        Ok(bytemuck::pod_collect_to_vec::<u8, u32>(&bytes).get(3).copied().unwrap_or(0))
+        Ok(self.words("arguments")?.get(3).copied().unwrap_or(0))
+    }
+
+    /// The words of one of the renderer's own buffers after the last frame.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] for a name that the configuration has no buffer of.
+    pub fn words(&mut self, name: &'static str) -> Result<Vec<u32>> {
+        let renderer = self.renderer.as_ref().ok_or_else(closed)?;
+        let buffer = renderer.buffer(name).ok_or_else(|| Error::argument("buffer", "one that the frame writes", name))?;
+        let bytes = self.read(buffer.size, |renderer, rec, target| {
+            if let Some(buffer) = renderer.buffer(name) {
+                copy_buffer(rec, buffer, target);
+            }
+        })?;
+        Ok(bytemuck::pod_collect_to_vec(&bytes))
     }
 
     /// The texels of one of the renderer's own images after the last frame, in its own format and extent.
@@ -314,6 +381,9 @@ impl Session {
 impl Drop for Session {
     fn drop(&mut self) {
         let mut bag = self.renderer.take().map_or_else(Retired::default, Renderer::destroy);
+        if let Some(image) = self.shown.levels.take() {
+            image.retire(&mut bag);
+        }
         for mesh in self.meshes.drain(..) {
             let all = [mesh.positions, mesh.normals, mesh.coordinates, mesh.indices];
             all.into_iter().chain(mesh.tangents).for_each(|buffer| buffer.retire(&mut bag));

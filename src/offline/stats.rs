@@ -41,7 +41,7 @@ pub struct Pixels {
     pub covered: u64,
     /// Shaded by themselves.
     pub shaded: u64,
-    /// Shaded by level.
+    /// Shaded by level: 0 is an output pixel, +1 is 2x2 coarser, -1 a quarter of a pixel.
     pub by_level: BTreeMap<i32, u64>,
 }
 

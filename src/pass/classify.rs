@@ -1,4 +1,5 @@
-//! Pass 6: the list of samples that carry a surface and the arguments of the indirect dispatch over it.
+//! Pass 6: the list of samples to shade and the arguments of the indirect dispatch over it. All covered ones at full rate;
+//! otherwise those that stand for a cell that must be shaded, and the weights of all other cells' parents.
 
 use crate::error::Result;
 use crate::gpu::access::Access;
@@ -7,36 +8,65 @@ use crate::gpu::pipeline::{BridgeSets, ComputePipeline, Interface, Resource};
 use crate::gpu::recorder::Recorder;
 use crate::gpu::retire::Retired;
 use crate::pass::PassContext;
+use crate::pass::pyramid::Cells;
 use ash::vk::DescriptorType as D;
 
 /// Pass, shader, label and timer name.
 pub const NAME: &str = "classify";
 
-/// Shader interface.
-pub const INTERFACE: Interface = Interface {
-    name: NAME,
-    local_size: [8, 8, 1],
-    push_bytes: 0,
-    gbuffer: true,
-    materials: false,
-    own: &[D::UNIFORM_BUFFER, D::STORAGE_BUFFER, D::STORAGE_BUFFER],
-};
+/// Shader interfaces: of the full rate, and of levels.
+pub const INTERFACES: [Interface; 2] = [
+    Interface {
+        name: NAME,
+        local_size: [8, 8, 1],
+        push_bytes: 0,
+        gbuffer: true,
+        materials: false,
+        own: &[D::UNIFORM_BUFFER, D::STORAGE_BUFFER, D::STORAGE_BUFFER],
+    },
+    Interface {
+        name: "classify.levels",
+        local_size: [64, 1, 1],
+        push_bytes: 0,
+        gbuffer: true,
+        materials: false,
+        own: &[
+            D::UNIFORM_BUFFER,
+            D::STORAGE_BUFFER,
+            D::STORAGE_BUFFER,
+            D::STORAGE_BUFFER,
+            D::STORAGE_BUFFER,
+            D::STORAGE_BUFFER,
+            D::STORAGE_BUFFER,
+        ],
+    },
+];
+
+/// What is decided from.
+pub(crate) enum From<'a> {
+    /// Every covered one of this many samples is shaded.
+    Samples([u32; 2]),
+    /// The pyramid, and the weights that are found: four words a block.
+    Cells(Cells<'a>, &'a Buffer),
+}
 
 pub(crate) struct Io<'a> {
     pub frame: &'a Buffer,
     pub bridge: BridgeSets,
-    pub shading: [u32; 2],
+    pub from: From<'a>,
     /// Out: groups in x, y, z; number of samples.
     pub arguments: &'a Buffer,
-    /// Out: `y << 16 | x` of each sample, tile by tile.
+    /// Out: the samples, `y << 16 | x` from samples, `list_entry` of `glsl/include/levels.glsl` from cells.
     pub list: &'a Buffer,
 }
 
 pub(crate) struct Classify(ComputePipeline);
 
 impl Classify {
-    pub fn new(p: &mut PassContext<'_, '_>) -> Result<Self> {
-        Ok(Self(ComputePipeline::new(p.build, p.modules, &INTERFACE, p.bridge, p.slots, &[])?))
+    /// For levels up to `top`; 0 is the full rate.
+    pub fn new(p: &mut PassContext<'_, '_>, top: u32) -> Result<Self> {
+        let (interface, constants) = if top == 0 { (&INTERFACES[0], vec![]) } else { (&INTERFACES[1], vec![top]) };
+        Ok(Self(ComputePipeline::new(p.build, p.modules, interface, p.bridge, p.slots, &constants)?))
     }
 
     pub fn record(&self, rec: &mut Recorder<'_>, io: &Io<'_>) {
@@ -48,10 +78,26 @@ impl Classify {
         unsafe { rec.cx.device.cmd_update_buffer(rec.cmd, io.arguments.handle, 0, bytemuck::bytes_of(&empty)) };
         rec.buffer(io.arguments, Access::COMPUTE_ATOMIC);
         rec.buffer(io.list, Access::COMPUTE_WRITE);
-        rec.flush();
-        let resources = [Resource::Uniform(io.frame), Resource::Buffer(io.arguments), Resource::Buffer(io.list)];
-        self.0.bind(rec, io.bridge, &resources, &());
-        self.0.dispatch(rec, io.shading);
+        let [arguments, list] = [io.arguments, io.list].map(Resource::Buffer);
+        match io.from {
+            From::Samples(extent) => {
+                rec.flush();
+                self.0.bind(rec, io.bridge, &[Resource::Uniform(io.frame), arguments, list], &());
+                self.0.dispatch(rec, extent);
+            }
+            From::Cells(Cells { cells, blocks, arguments: all }, weights) => {
+                rec.buffer(cells, Access::COMPUTE_READ);
+                rec.buffer(blocks, Access::COMPUTE_READ);
+                rec.buffer(all, Access::INDIRECT);
+                rec.buffer(all, Access::COMPUTE_READ);
+                rec.buffer(weights, Access::COMPUTE_WRITE);
+                rec.flush();
+                let [cells, blocks, counts, weights] = [cells, blocks, all, weights].map(Resource::Buffer);
+                let resources = [Resource::Uniform(io.frame), cells, blocks, counts, weights, arguments, list];
+                self.0.bind(rec, io.bridge, &resources, &());
+                self.0.dispatch_indirect(rec, all, 0);
+            }
+        }
         rec.end();
     }
 

@@ -6,14 +6,17 @@ pub mod curvature;
 pub mod environment;
 pub mod filter;
 pub mod gbuffer;
+pub(crate) mod level;
 pub(crate) mod maps;
 pub mod materials;
 pub mod modules;
 #[cfg(feature = "offline")]
 pub(crate) mod probe;
+pub mod pyramid;
 pub mod resolve;
 pub mod shade;
 pub mod tonemap;
+pub mod upsample;
 
 use crate::gpu::pipeline::{BridgeLayouts, Interface, Modules};
 use crate::gpu::retire::Build;
@@ -30,6 +33,7 @@ pub(crate) struct FrameUniform {
     pub sampling: [u32; 4],
     pub environment: [f32; 4],
     pub lights: [u32; 4],
+    pub levels: [[i32; 4]; 6],
 }
 
 /// What passes are built from.
@@ -42,7 +46,9 @@ pub(crate) struct PassContext<'a, 'b> {
 
 /// The shader interfaces of all compute modules, for tests and host profilers.
 pub fn interfaces() -> Vec<Interface> {
-    let mut all = vec![filter::INTERFACE, curvature::INTERFACE, classify::INTERFACE, shade::INTERFACE, resolve::INTERFACE];
+    let mut all = vec![filter::INTERFACE, curvature::INTERFACE, pyramid::INTERFACE];
+    all.extend(classify::INTERFACES);
+    all.extend([shade::INTERFACE, upsample::INTERFACE, resolve::INTERFACE]);
     all.extend(tonemap::INTERFACES);
     all
 }

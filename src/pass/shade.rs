@@ -34,6 +34,7 @@ pub const INTERFACE: Interface = Interface {
         D::STORAGE_BUFFER,
         D::STORAGE_IMAGE,
         D::STORAGE_BUFFER,
+        D::STORAGE_IMAGE,
         D::COMBINED_IMAGE_SAMPLER,
         D::COMBINED_IMAGE_SAMPLER,
     ],
@@ -64,20 +65,26 @@ pub(crate) struct Io<'a> {
     pub directions: Directions,
     /// Out: linear radiance where listed.
     pub radiance: &'a Image,
+    /// Out, where samples stand for cells: that of odd levels.
+    pub odd: Option<&'a Image>,
 }
 
 /// One pipeline for frames without lights beside the environment, one for frames with.
 pub(crate) struct Shade([ComputePipeline; 2]);
 
 impl Shade {
-    pub fn new(p: &mut PassContext<'_, '_>, estimator: Estimator) -> Result<Self> {
+    /// `levelled` says whether entries of the list stand for cells of levels.
+    pub fn new(p: &mut PassContext<'_, '_>, estimator: Estimator, levelled: bool) -> Result<Self> {
         let constant = match estimator {
             Estimator::Mis => 0,
             Estimator::Brdf => 1,
             Estimator::BrdfRandom => 2,
             Estimator::Lookup => 3,
         };
-        let mut make = |lights| ComputePipeline::new(p.build, p.modules, &INTERFACE, p.bridge, p.slots, &[constant, lights]);
+        let mut make = |lights| {
+            let constants = [constant, lights, u32::from(levelled)];
+            ComputePipeline::new(p.build, p.modules, &INTERFACE, p.bridge, p.slots, &constants)
+        };
         Ok(Self([make(0)?, make(1)?]))
     }
 
@@ -91,6 +98,9 @@ impl Shade {
         rec.buffer(io.arguments, Access::COMPUTE_READ);
         rec.buffer(io.list, Access::COMPUTE_READ);
         rec.overwrite(io.radiance, Access::COMPUTE_WRITE);
+        if let Some(odd) = io.odd {
+            rec.overwrite(odd, Access::COMPUTE_WRITE);
+        }
         rec.flush();
         let resources = [
             Resource::Uniform(io.frame),
@@ -100,6 +110,7 @@ impl Shade {
             Resource::Buffer(io.list),
             Resource::Storage(io.radiance.view),
             Resource::Buffer(io.lights),
+            Resource::Storage(io.odd.unwrap_or(io.radiance).view),
             Resource::Sampled(io.normals, io.samplers.nearest),
             Resource::Sampled(io.factors, io.samplers.nearest),
         ];
@@ -107,7 +118,7 @@ impl Shade {
         let push = Push { brdf_samples: brdf, environment_samples: environment, light_samples: light };
         let pipeline = &self.0[usize::from(io.light_count > 0)];
         pipeline.bind(rec, io.bridge, &resources, &push);
-        pipeline.dispatch_indirect(rec, io.arguments);
+        pipeline.dispatch_indirect(rec, io.arguments, 0);
         rec.end();
     }
 

@@ -61,7 +61,8 @@ pub struct Args {
     /// Override a key of the scene: camera.fov_y=40
     #[arg(long, value_name = "PATH=VALUE", value_parser = assignment)]
     set: Vec<(String, String)>,
-    /// Extra layers of an EXR: depth, normal, material, object, uv, footprint, curvature, shaded, samples
+    /// Extra layers of an EXR: depth, normal, material, object, uv, footprint, curvature, level,
+    /// weight, shaded, samples
     #[arg(long, value_name = "NAME", value_delimiter = ',')]
     aov: Vec<String>,
     /// A converged full-rate image of N directions a pixel instead
@@ -141,9 +142,16 @@ fn assignment(text: &str) -> std::result::Result<(String, String), String> {
 }
 
 impl Args {
-    fn settings(&self, scene_size: Option<[u32; 2]>) -> Result<Settings> {
+    fn settings(&self, scene_size: Option<[u32; 2]>, lmax: Option<u32>) -> Result<Settings> {
         let later = |yes: bool, what: &str| if yes { Err(Error::NotSupportedYet { what: what.into() }) } else { Ok(()) };
-        later(!matches!(self.rate, Rate::Full), "--rate other than full")?;
+        let rate = match self.rate {
+            Rate::Full => passband::Rate::Full,
+            Rate::Half => passband::Rate::Uniform(1),
+            Rate::Quarter => passband::Rate::Uniform(2),
+            Rate::Luminance | Rate::Bandwidth | Rate::Oracle => {
+                return Err(Error::NotSupportedYet { what: "--rate luminance, bandwidth and oracle".into() });
+            }
+        };
         let estimator = match self.estimator {
             Method::Mis => Estimator::Mis,
             Method::Brdf => Estimator::Brdf,
@@ -162,6 +170,8 @@ impl Args {
         later(!self.literal.is_empty(), "--literal")?;
         Ok(Settings {
             extent: self.size.or(scene_size).unwrap_or([512, 512]),
+            rate,
+            lmax,
             samples: self.samples,
             estimator,
             samples_per_side: self.aa,
@@ -176,15 +186,16 @@ impl Args {
 
 /// Runs the subcommand.
 pub fn run(args: &Args) -> Result<ExitCode> {
-    args.settings(None)?;
+    args.settings(None, None)?;
     let extension = args.output.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
     if !["exr", "png", "hdr"].contains(&extension.as_str()) {
         return Err(Error::argument("--output", "a name that ends in .exr, .png or .hdr", args.output.display()));
     }
     let clock = Instant::now();
-    let world = Scene::load(&args.scene, &args.set)?.resolve()?;
+    let scene = Scene::load(&args.scene, &args.set)?;
+    let world = scene.resolve()?;
     let loading = clock.elapsed().as_secs_f64() * 1e3;
-    let settings = args.settings(world.size)?;
+    let settings = args.settings(world.size, scene.lmax())?;
 
     let style = ProgressStyle::with_template("{msg} {bar:30} {pos}/{len} {eta}").unwrap_or_else(|_| ProgressStyle::default_bar());
     let bar = ProgressBar::new(1).with_style(style).with_message("frames");

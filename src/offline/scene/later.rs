@@ -49,7 +49,7 @@ impl Check<'_> {
             self.each(threshold, |c, v| c.number(v, "0 < threshold < 1", |v| v > 0.0 && v < 1.0))?;
         }
         self.each(&s.budget, |c, v| c.number(v, "a number above 0", |v| v > 0.0))?;
-        self.each(&s.lmax, |c, v| c.require(*v.get_ref() <= 14, &v.span(), "a level from 0 to 14", v.get_ref()))?;
+        self.each(&s.lmax, |c, v| c.require(*v.get_ref() <= 5, &v.span(), "a level from 0 to 5", v.get_ref()))?;
         self.each(&s.anisotropy, |c, v| c.number(v, "1 to 16", |v| (1.0..=16.0).contains(&v)))?;
         self.each(&s.lod_bias, |c, v| c.number(v, "-16 to 16", |v| v.abs() <= 16.0))?;
         let all = [
@@ -58,7 +58,6 @@ impl Check<'_> {
             span(&s.eps),
             span(&s.np_rule),
             span(&s.budget),
-            span(&s.lmax),
             span(&s.bins),
             span(&s.eps0),
             span(&s.eps1),

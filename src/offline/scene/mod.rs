@@ -86,6 +86,11 @@ impl Scene {
         resolve::world(self)
     }
 
+    /// The coarsest level of shading that the scene asks for, if it does: 0 is an output pixel, +1 is 2x2 coarser.
+    pub fn lmax(&self) -> Option<u32> {
+        self.file.settings.lmax.as_ref().map(|v| *v.get_ref())
+    }
+
     /// Names of the built-in scenes, each with a line that describes it.
     pub fn builtin_names() -> Vec<(&'static str, &'static str)> {
         let describe = |text: &'static str| text.lines().next().unwrap_or_default().trim_start_matches(['#', ' ']);
