@@ -3,6 +3,7 @@
 pub mod config;
 pub mod error;
 mod frame;
+pub mod frequency;
 pub mod gpu;
 pub mod light;
 #[cfg(feature = "offline")]

@@ -1,0 +1,14 @@
+//! Frequency analysis of the light field (Bagher et al. 2011, sections 2.1, 2.2, 2.4 and the appendix), in f64.
+//!
+//! **One bandwidth.** Every source returns the frequency that holds 95 % of the energy in true cycles: angular cycles/radian,
+//! spatial cycles/metre (textures: cycles per texture unit), image cycles/pixel. Wavelet estimates are divided by their bias
+//! ([`wavelet::bias`]).
+
+pub mod environment;
+pub mod level;
+pub mod operators;
+pub mod texture;
+pub mod wavelet;
+
+pub use environment::AngularBandwidth;
+pub use operators::Operator;
