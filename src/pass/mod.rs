@@ -4,6 +4,7 @@
 pub mod classify;
 pub mod curvature;
 pub mod environment;
+pub mod environment_bandwidth;
 pub mod gbuffer;
 pub mod materials;
 pub mod modules;
@@ -42,5 +43,6 @@ pub(crate) struct PassContext<'a, 'b> {
 pub fn interfaces() -> Vec<Interface> {
     let mut all = vec![curvature::INTERFACE, classify::INTERFACE, shade::INTERFACE, resolve::INTERFACE];
     all.extend(tonemap::INTERFACES);
+    all.extend(environment_bandwidth::INTERFACES);
     all
 }
