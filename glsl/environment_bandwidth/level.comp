@@ -14,6 +14,7 @@ layout(push_constant) uniform Push {
 
 // Over sqrt 2 of the orthonormal taps, so that averages are averages and details amplitudes.
 const vec4 LOW = vec4(0.341506350946, 0.591506350946, 0.158493649054, -0.091506350946);
+const int TALL = 4; // rows of coefficients an invocation
 const vec4 HIGH = vec4(LOW.w, -LOW.z, LOW.y, -LOW.x);
 
 float fetch(int x, int y) {
@@ -36,15 +37,15 @@ vec4 row(int x, int y) {
 }
 
 void main() {
-    ivec2 first = 2 * ivec2(gl_GlobalInvocationID.xy), count = size / 2;
+    ivec2 first = ivec2(2, TALL) * ivec2(gl_GlobalInvocationID.xy), count = size / 2;
     if (any(greaterThanEqual(first, count))) {
         return;
     }
-    vec4 rows[6];
-    for (int k = 0; k < 6; ++k) {
+    vec4 rows[2 * TALL + 2];
+    for (int k = 0; k < 2 * TALL + 2; ++k) {
         rows[k] = row(2 * first.x, 2 * first.y + k);
     }
-    for (int j = 0; j < 2; ++j) {
+    for (int j = 0; j < TALL; ++j) {
         vec4 low = vec4(0.0), high = vec4(0.0);
         for (int k = 0; k < 4; ++k) {
             low += LOW[k] * rows[2 * j + k];
@@ -55,7 +56,10 @@ void main() {
             ivec2 p = first + ivec2(i, j);
             if (all(lessThan(p, count))) {
                 imageStore(average, p, vec4(low[i]));
-                imageStore(details, place + p, vec4(x[i], y[i], 0.0, 0.0));
+                // Nobody asks for those of the copy, but for the two rows next to the map's first across the seam.
+                if (p.y * 2 < count.y || p.y + 2 >= count.y) {
+                    imageStore(details, place + p, vec4(x[i], y[i], 0.0, 0.0));
+                }
             }
         }
     }

@@ -168,7 +168,9 @@ impl EnvironmentBandwidth {
             let set = if h == 1 { 0 } else { 1 + h as usize % 2 };
             let pipeline = &self.level[usize::from(h == 1)];
             pipeline.bind_set(rec, work.sets[1].sets[set], &LevelPush { size: size(h - 1), place: place(h) });
-            pipeline.dispatch(rec, unsigned(size(h)).map(|n| n.div_ceil(2)));
+            // An invocation does two columns and four rows.
+            let [x, y] = unsigned(size(h));
+            pipeline.dispatch(rec, [x.div_ceil(2), y.div_ceil(4)]);
         }
 
         rec.image(&work.details, Access::COMPUTE_SAMPLED);
