@@ -131,6 +131,7 @@ pub fn run(options: &Options) -> Result<Report, Box<dyn Error>> {
                 environment: EnvironmentUse::default(),
                 lights: &[],
                 seed: [0, 0],
+                levels: None,
                 output: Some(Output { image: output, transfer: Transfer::Srgb { exposure: 0.5 } }),
             };
             renderer.record(cmd, &inputs)?;

@@ -19,7 +19,10 @@ use crate::material::Material;
 use crate::pass::environment::{EnvironmentImages, EnvironmentUpload};
 use crate::pass::gbuffer::{self, GBuffer};
 use crate::pass::materials::{MaterialBridge, MaterialImages, MaterialsUpload};
-use crate::pass::{FrameUniform, PassContext, classify, curvature, filter, level, pyramid, resolve, shade, tonemap, upsample};
+use crate::pass::{
+    FrameUniform, PassContext, classify, curvature, environment_bandwidth, filter, level, pyramid, resolve, shade, tonemap,
+    upsample,
+};
 use crate::plan::{Directions, LIGHT_BYTES};
 use crate::sampling::LatLong;
 use crate::targets::Targets;
@@ -27,6 +30,7 @@ use ash::vk;
 
 /// Passes of the frame.
 struct Passes {
+    environment_bandwidth: environment_bandwidth::EnvironmentBandwidth,
     gbuffer: Option<GBuffer>,
     curvature: Option<curvature::Curvature>,
     pyramid: Option<pyramid::Pyramid>,
@@ -128,12 +132,12 @@ impl Renderer {
         map: &LatLong,
         memory: &mut dyn HostAllocator,
     ) -> Result<Retired> {
-        let upload = Build::run(&self.cx, memory, |build| EnvironmentUpload::new(build, map))?;
+        let pass = &self.passes.environment_bandwidth;
+        let bandwidth = Some((pass, &self.samplers));
+        let upload = Build::run(&self.cx, memory, |build| EnvironmentUpload::new(build, map, bandwidth))?;
         let mut bag = Retired::default();
         let mut rec = Recorder::new(&self.cx, cmd, 0, &mut self.states, None);
-        rec.begin(crate::pass::environment::NAME);
-        let fresh = upload.record(&mut rec, &mut bag);
-        rec.end();
+        let fresh = upload.record(&mut rec, pass, &mut bag);
         if let Some(former) = self.environment.replace(fresh) {
             former.retire(&mut self.states, &mut bag);
         }
@@ -346,10 +350,11 @@ impl Renderer {
         bag
     }
 
-    /// One of the renderer's own colour images of the last frame, by name.
+    /// One of the renderer's own colour images of the last frame, or the environment's bandwidth, by name.
     #[cfg(feature = "offline")]
     pub(crate) fn image(&self, name: &str) -> Option<&Image> {
-        self.targets.image(name)
+        let bandwidth = self.environment.as_ref().and_then(|e| e.bandwidth.as_ref()).filter(|i| i.desc.name == name);
+        bandwidth.or_else(|| self.targets.image(name))
     }
 
     /// One of the renderer's own buffers of the last frame, by name.
@@ -422,6 +427,7 @@ impl Passes {
         p.bridge.gbuffer = layout(&gbuffer, config);
         let top = config.coarsest();
         Ok(Self {
+            environment_bandwidth: environment_bandwidth::EnvironmentBandwidth::new(&mut p)?,
             gbuffer,
             curvature: config.curvature.then(|| curvature::Curvature::new(&mut p)).transpose()?,
             pyramid: (top > 0).then(|| pyramid::Pyramid::new(&mut p, top)).transpose()?,
@@ -434,6 +440,7 @@ impl Passes {
     }
 
     fn retire(self, bag: &mut Retired) {
+        self.environment_bandwidth.retire(bag);
         if let Some(pass) = self.gbuffer {
             pass.retire(bag);
         }

@@ -95,7 +95,7 @@ impl Sets {
         types: &[vk::DescriptorType],
         slots: usize,
     ) -> Result<Self> {
-        if types.is_empty() {
+        if types.is_empty() || slots == 0 {
             return Ok(Self { pool: vk::DescriptorPool::null(), sets: vec![vk::DescriptorSet::null(); slots] });
         }
         let sizes: Vec<_> =
@@ -258,10 +258,25 @@ impl ComputePipeline {
     /// Binds everything for a dispatch in the recorder's slot. `push` must be as large as the interface says.
     pub fn bind<P: NoUninit>(&self, rec: &Recorder<'_>, bridge: BridgeSets, resources: &[Resource<'_>], push: &P) {
         debug_assert_eq!(resources.len(), self.interface.own.len(), "{}", self.interface.name);
-        debug_assert_eq!(size_of::<P>() as u32, self.interface.push_bytes, "{}", self.interface.name);
         let device = &rec.cx.device;
         let own = self.sets.sets[rec.slot];
         write_set(device, own, resources);
+        self.bind_sets(rec, bridge, own, push);
+    }
+
+    /// `count` further sets for [`Self::bind_set`], which whoever asks for them writes.
+    pub fn sets(&self, build: &mut Build<'_>, count: usize) -> Result<Sets> {
+        Sets::new(build, self.set_layouts[0], self.interface.own, count)
+    }
+
+    /// Binds everything for a dispatch of a pass that reads neither bridge, with a set that was written before.
+    pub fn bind_set<P: NoUninit>(&self, rec: &Recorder<'_>, set: vk::DescriptorSet, push: &P) {
+        self.bind_sets(rec, BridgeSets::NONE, set, push);
+    }
+
+    fn bind_sets<P: NoUninit>(&self, rec: &Recorder<'_>, bridge: BridgeSets, own: vk::DescriptorSet, push: &P) {
+        debug_assert_eq!(size_of::<P>() as u32, self.interface.push_bytes, "{}", self.interface.name);
+        let device = &rec.cx.device;
         let bind = |index: u32, set: vk::DescriptorSet| {
             // SAFETY: the command buffer is recording; the set fits the layout's slot `index`.
             unsafe { device.cmd_bind_descriptor_sets(rec.cmd, vk::PipelineBindPoint::COMPUTE, self.layout, index, &[set], &[]) };

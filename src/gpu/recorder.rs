@@ -118,7 +118,6 @@ impl<'a> Recorder<'a> {
     }
 
     /// Forgets a resource that is about to be destroyed.
-    #[cfg(feature = "offline")]
     pub fn forget(&mut self, handle: impl vk::Handle) {
         self.states.forget(handle);
     }

@@ -56,6 +56,7 @@ impl Requirements {
                 (vk::Format::R32G32B32A32_SFLOAT, filtered | F::STORAGE_IMAGE | F::COLOR_ATTACHMENT),
                 (vk::Format::R16G16B16A16_SFLOAT, sampled | F::STORAGE_IMAGE),
                 (vk::Format::R32G32B32A32_UINT, sampled),
+                (vk::Format::R32_SFLOAT, sampled | F::STORAGE_IMAGE),
                 (vk::Format::R32_UINT, sampled | F::COLOR_ATTACHMENT),
                 (vk::Format::R32G32_SFLOAT, sampled | F::COLOR_ATTACHMENT),
                 (vk::Format::R16_SFLOAT, filtered),

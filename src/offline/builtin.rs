@@ -9,8 +9,8 @@ use crate::sampling::LatLong;
 /// Names of the built-in meshes.
 pub const MESHES: [&str; 5] = ["sphere", "bumpy-sphere", "torus-knot", "plane", "cloth"];
 
-/// Names of the built-in environments.
-pub const ENVIRONMENTS: [&str; 3] = ["sun-sky", "studio", "constant"];
+/// Names of the built-in environments. `cosine-K` holds one frequency, of K radians a radian.
+pub const ENVIRONMENTS: [&str; 6] = ["sun-sky", "studio", "constant", "cosine-64", "cosine-128", "cosine-200"];
 
 /// Segments around the sphere that scenes get: silhouettes and curvature are smooth at 512x512.
 pub const DEFAULT_DETAIL: u32 = 256;
@@ -49,6 +49,9 @@ pub fn environment(name: &str, width: u32) -> Result<LatLong> {
         "sun-sky" => skies::sun_sky(width),
         "studio" => skies::studio(width),
         "constant" => skies::constant(width),
+        "cosine-64" => skies::cosine(width, 64.0),
+        "cosine-128" => skies::cosine(width, 128.0),
+        "cosine-200" => skies::cosine(width, 200.0),
         _ => return Err(Error::argument("built-in environment", ENVIRONMENTS.join(", "), name)),
     };
     map.map_err(|e: LibraryError| e.into())

@@ -6,7 +6,9 @@ use crate::gpu::access::Access;
 use crate::gpu::image::{Image, ImageDesc};
 use crate::gpu::recorder::{Recorder, States};
 use crate::gpu::retire::{Build, Retired};
+use crate::gpu::sampler::Samplers;
 use crate::gpu::upload::ImageUpload;
+use crate::pass::environment_bandwidth::{self, EnvironmentBandwidth, Work};
 use crate::sampling::LatLong;
 use crate::sampling::environment::EnvironmentImportance;
 use ash::vk;
@@ -23,16 +25,21 @@ pub(crate) struct EnvironmentImages {
     pub map: Image,
     /// RG32UI: alias alias of every row's texels, and the rows' own alias.
     pub alias: Image,
+    /// R32F: cycles/radian around each direction, one value a 2x2 block of the map that is analysed; looked up with the map's
+    /// own coordinates, nearest. None if nobody asked.
+    pub bandwidth: Option<Image>,
 }
 
 /// Created and filled, not yet recorded.
 pub(crate) struct EnvironmentUpload {
     map: ImageUpload,
     alias: ImageUpload,
+    bandwidth: Option<Work>,
 }
 
 impl EnvironmentUpload {
-    pub fn new(build: &mut Build<'_>, map: &LatLong) -> Result<Self> {
+    /// With `bandwidth` the upload is followed by that pass.
+    pub fn new(build: &mut Build<'_>, map: &LatLong, bandwidth: Option<(&EnvironmentBandwidth, &Samplers)>) -> Result<Self> {
         // Its largest sum over texels must stay finite in 32 bits.
         let brightest = map.texels().iter().flatten().copied().fold(0.0, f32::max);
         if brightest > 1e30 {
@@ -48,14 +55,22 @@ impl EnvironmentUpload {
         let radiance_desc = desc("environment", vk::Format::R32G32B32A32_SFLOAT, [map.width(), map.height()]);
         let alias_desc =
             desc("environment alias", vk::Format::R32G32B32A32_UINT, [SLOTS_A_ROW, slots.len() as u32 / SLOTS_A_ROW]);
-        Ok(Self {
-            map: ImageUpload::new(build, radiance_desc, bytemuck::cast_slice(&radiance))?,
-            alias: ImageUpload::new(build, alias_desc, bytemuck::cast_slice(&slots))?,
-        })
+        let upload = ImageUpload::new(build, radiance_desc, bytemuck::cast_slice(&radiance))?;
+        let bandwidth = match bandwidth {
+            Some((pass, samplers)) => Some(pass.prepare(build, samplers, map, &upload.image)?),
+            None => None,
+        };
+        Ok(Self { map: upload, alias: ImageUpload::new(build, alias_desc, bytemuck::cast_slice(&slots))?, bandwidth })
     }
 
-    pub fn record(self, rec: &mut Recorder<'_>, bag: &mut Retired) -> EnvironmentImages {
-        EnvironmentImages { map: self.map.record(rec, bag), alias: self.alias.record(rec, bag) }
+    /// Needs the pass if it was created with it.
+    pub fn record(self, rec: &mut Recorder<'_>, pass: &EnvironmentBandwidth, bag: &mut Retired) -> EnvironmentImages {
+        rec.begin(NAME);
+        let (map, alias) = (self.map.record(rec, bag), self.alias.record(rec, bag));
+        rec.end();
+        let io = environment_bandwidth::Io { map: &map };
+        let bandwidth = self.bandwidth.map(|work| pass.record(rec, &io, work, bag));
+        EnvironmentImages { map, alias, bandwidth }
     }
 }
 
@@ -67,7 +82,7 @@ impl EnvironmentImages {
     }
 
     pub fn retire(self, states: &mut States, bag: &mut Retired) {
-        for image in [self.map, self.alias] {
+        for image in [self.map, self.alias].into_iter().chain(self.bandwidth) {
             states.forget(image.handle);
             image.retire(bag);
         }

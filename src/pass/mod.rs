@@ -4,6 +4,7 @@
 pub mod classify;
 pub mod curvature;
 pub mod environment;
+pub mod environment_bandwidth;
 pub mod filter;
 pub mod gbuffer;
 pub(crate) mod level;
@@ -50,5 +51,6 @@ pub fn interfaces() -> Vec<Interface> {
     all.extend(classify::INTERFACES);
     all.extend([shade::INTERFACE, upsample::INTERFACE, resolve::INTERFACE]);
     all.extend(tonemap::INTERFACES);
+    all.extend(environment_bandwidth::INTERFACES);
     all
 }

@@ -225,6 +225,7 @@ impl Target {
             environment: EnvironmentUse::default(),
             lights: &[],
             seed: [7, 0],
+            levels: None,
             output: Some(Output { image: self.image, transfer: Transfer::Linear }),
         }
     }

@@ -1,6 +1,7 @@
 //! Every GPU formula has an f64 twin: each is run on the device over random and edge inputs and compared with its twin.
 
 mod angles;
+mod bandwidth;
 mod environment;
 mod materials;
 mod sampling;

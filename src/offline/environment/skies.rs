@@ -54,6 +54,12 @@ pub(crate) fn constant(width: u32) -> Result<LatLong> {
     map(width, |_, _| DVec3::ONE)
 }
 
+/// Radiance of one frequency: `1 + cos(K angle)`, the angle from +X in radians. Its bandwidth is K / 2 pi cycles/radian everywhere
+/// but around +X and -X.
+pub(crate) fn cosine(width: u32, k: f64) -> Result<LatLong> {
+    map(width, |_, d| DVec3::splat(1.0 + (k * d.x.clamp(-1.0, 1.0).acos()).cos()))
+}
+
 fn sky(d: DVec3, to_sun: DVec3) -> DVec3 {
     let (zenith, horizon, ground) = (dvec3(0.14, 0.33, 0.85), dvec3(0.95, 1.0, 1.05), dvec3(0.17, 0.14, 0.11));
     let above = horizon.lerp(zenith, d.y.max(0.0).powf(0.45));
