@@ -54,8 +54,8 @@ pub const LOADERS: [Loader; 13] = [
     }),
     // A JPEG comes as the image of a glTF material.
     Loader { prepare: |folder| put(&folder.join("m.gltf"), IMAGED), ..row("jpg", "image.jpg", IMAGE, image) },
-    row("obj", "m.obj", MESH, |path, data| one_mesh(path, data)),
-    row("ply", "m.ply", MESH, |path, data| one_mesh(path, data)),
+    row("obj", "m.obj", MESH, one_mesh),
+    row("ply", "m.ply", MESH, one_mesh),
     row("off", "m.off", MESH, |path, data| {
         one_mesh(path, data);
         // The smallest format finds most meshes for the atlas, which takes its time on large ones.
@@ -70,7 +70,7 @@ pub const LOADERS: [Loader; 13] = [
         let mesh = check(mesh::read(path));
         assert!(model.is_none() || mesh.is_some(), "the mesh alone never fails where the whole model does not");
     }),
-    row("gz", "m.off.gz", GZIP, |path, data| one_mesh(path, data)),
+    row("gz", "m.off.gz", GZIP, one_mesh),
     row("scene", "m.toml", 1 << 14, scene),
 ];
 
