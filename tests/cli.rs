@@ -43,12 +43,8 @@ impl Folder {
     }
 
     fn run(&self, args: &[&str]) -> Run {
-        self.run_with(args, &[])
-    }
-
-    fn run_with(&self, args: &[&str], variables: &[(&str, &str)]) -> Run {
         let mut command = Command::new(env!("CARGO_BIN_EXE_passband"));
-        let output = command.args(args).envs(variables.iter().copied()).current_dir(&self.0).output().unwrap();
+        let output = command.args(args).current_dir(&self.0).output().unwrap();
         let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
         Run { code: output.status.code().unwrap(), stdout: text(output.stdout), stderr: text(output.stderr) }
     }
@@ -123,29 +119,21 @@ fn every_documented_flag_works_or_is_not_supported_yet() {
     assert_eq!(folder.files(), ["stats.json"]);
 }
 
+/// Wrong files, outputs and drivers are the rows of `tests/unbreakable`.
 #[test]
 fn wrong_arguments_end_with_2_and_leave_nothing() {
     let folder = Folder::new("wrong");
-    std::fs::write(folder.0.join("file"), "").unwrap();
     std::fs::write(folder.0.join("key.toml"), "[camera]\nposition = [0, 0, 3]\nzoom = 2\n").unwrap();
-    std::fs::write(folder.0.join("syntax.toml"), "[camera\n").unwrap();
-    std::fs::create_dir(folder.0.join("folder.exr")).unwrap();
     let before = folder.files();
     let cases: &[(&[&str], &[&str])] = &[
         (&["teapot"], &["scene", "trio", "`teapot`"]),
-        (&["missing.toml"], &["missing.toml"]),
         (&["key.toml"], &["key.toml:3", "zoom"]),
-        (&["syntax.toml"], &["syntax.toml:1"]),
         (&["furnace", "--size", "0x0"], &["--size", "1 to 16384", "0x0"]),
         (&["furnace", "--size", "99999x1"], &["--size", "1 to 16384", "99999x1"]),
         (&["furnace", "--size", "abc"], &["--size", "WxH", "abc"]),
         (&["furnace", "--size", "8"], &["--size", "WxH"]),
         (&["furnace", "-o", "out.jpg"], &["--output", ".exr, .png or .hdr", "out.jpg"]),
         (&["furnace", "-o", "out"], &["--output", "out"]),
-        (&["furnace", "-o", "nowhere/out.exr"], &["cannot write nowhere/out.exr"]),
-        (&["furnace", "-o", "file/out.png"], &["cannot write file/out.png"]),
-        (&["furnace", "-o", "folder.exr"], &["cannot write folder.exr"]),
-        (&["furnace", "--stats", "nowhere/stats.json", "-o", "nowhere/out.exr"], &["cannot write nowhere/"]),
         (&["furnace", "--aov", "albedo"], &["--aov", "depth", "`albedo`"]),
         (&["furnace", "--aov", "depth,"], &["--aov"]),
         (&["furnace", "--samples", "0"], &["2 to 65536", "got 0"]),
@@ -173,16 +161,11 @@ fn wrong_arguments_end_with_2_and_leave_nothing() {
 }
 
 #[test]
-fn no_device_and_no_driver_end_with_3_and_leave_nothing() {
+fn no_such_device_ends_with_3_and_leaves_nothing() {
     let folder = Folder::new("device");
     let render = ["render", "furnace", "--size", "8x8"];
     folder.run(&[&render[..], &["--device", "nonsense"]].concat()).refused(3, &["nonsense", "llvmpipe"]);
     folder.run(&[&render[..], &["--device", "99"]].concat()).refused(3, &["99", "llvmpipe"]);
-    let missing = folder.0.join("missing.json");
-    let missing = missing.to_str().unwrap();
-    let none = [("VK_ICD_FILENAMES", missing), ("VK_DRIVER_FILES", missing)];
-    folder.run_with(&render, &none).refused(3, &["Vulkan"]);
-    folder.run_with(&["info"], &none).refused(3, &["Vulkan"]);
     assert_eq!(folder.files(), Vec::<String>::new());
 }
 

@@ -31,7 +31,7 @@ impl std::fmt::Display for At {
 #[non_exhaustive]
 pub enum Error {
     /// A file is missing, unreadable, malformed or holds an impossible value.
-    #[error("{}{at}: {field}: expected {expected}, got {got}", path.display())]
+    #[error("{}{at}: {}: expected {}, got {}", plain(path.display()), plain(field), plain(expected), plain(got))]
     File {
         /// The file.
         path: PathBuf,
@@ -45,7 +45,7 @@ pub enum Error {
         got: String,
     },
     /// A command-line argument or name is not usable.
-    #[error("{field}: expected {expected}, got {got}")]
+    #[error("{}: expected {}, got {}", plain(field), plain(expected), plain(got))]
     Argument {
         /// The flag or name.
         field: String,
@@ -55,13 +55,13 @@ pub enum Error {
         got: String,
     },
     /// Something that the format or the command knows, but that this version cannot do yet.
-    #[error("{what} is not supported yet")]
+    #[error("{} is not supported yet", plain(what))]
     NotSupportedYet {
         /// The key or flag, with the file where there is one.
         what: String,
     },
     /// An output could not be written; nothing was left behind.
-    #[error("cannot write {}: {reason}", path.display())]
+    #[error("cannot write {}: {}", plain(path.display()), plain(reason))]
     Write {
         /// The output.
         path: PathBuf,
@@ -98,7 +98,24 @@ impl Error {
     }
 }
 
+/// The most characters of a file that an error quotes.
+const LONGEST: usize = 400;
+
 /// Errors are one line, whatever a parser said.
 fn one_line(text: impl ToString) -> String {
-    text.to_string().split_whitespace().collect::<Vec<_>>().join(" ")
+    let text = text.to_string().split_whitespace().collect::<Vec<_>>().join(" ");
+    match text.char_indices().nth(LONGEST) {
+        Some((end, _)) => text.get(..end).unwrap_or_default().to_string() + "...",
+        None => text,
+    }
+}
+
+/// What files and file names say, with control characters written out: they would break the line or command the terminal.
+fn plain(text: impl ToString) -> String {
+    let text = text.to_string();
+    if text.contains(char::is_control) {
+        text.chars().flat_map(|c| if c.is_control() { c.escape_default().collect() } else { vec![c] }).collect()
+    } else {
+        text
+    }
 }

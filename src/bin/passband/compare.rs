@@ -4,7 +4,6 @@ use comfy_table::{CellAlignment, Table, presets};
 use passband::offline::error::{Error, Result};
 use passband::offline::image_io::write_png;
 use passband::offline::metrics::{Exposure, Mask, Metrics, Pair, compare, read_frames};
-use std::io::Write;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -95,10 +94,9 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         write_png(path, result.map.width, result.map.height, &opaque)?;
     }
     let text = if args.json { json(&result.metrics)? } else { table(&result.metrics) };
-    let failed = |e: std::io::Error| Error::Write { path: "standard output".into(), reason: e.to_string() };
-    writeln!(std::io::stdout(), "{text}").map_err(failed)?;
+    crate::print(text)?;
     for breach in &breaches {
-        eprintln!("passband: {breach}");
+        crate::complain(breach);
     }
     Ok(if breaches.is_empty() { ExitCode::SUCCESS } else { ExitCode::from(1) })
 }

@@ -34,18 +34,19 @@ pub fn run(args: &Args) -> Result<ExitCode> {
             .collect();
         let report = json!({ "schema": 1, "version": env!("CARGO_PKG_VERSION"), "devices": devices,
             "footprint_512x512_bytes": footprint.total() });
-        println!("{report:#}");
+        crate::print(format_args!("{report:#}"))?;
         return Ok(ExitCode::SUCCESS);
     }
     for (index, (info, rows)) in devices.iter().enumerate() {
-        println!("{index}: {} ({}; Vulkan {}; {})", info.name, info.kind, info.api, info.driver);
+        crate::print(format_args!("{index}: {} ({}; Vulkan {}; {})", info.name, info.kind, info.api, info.driver))?;
         let mut table = Table::new();
         table.load_style(presets::NOTHING).set_header(["", "requirement", "needed", "found"]);
         for row in rows {
             table.add_row([if row.ok { "ok" } else { "MISSING" }, &row.name, &row.needed, &row.found]);
         }
-        println!("{table}\n");
+        crate::print(format_args!("{table}\n"))?;
     }
-    println!("A renderer at 512x512 takes {:.1} MiB before environments and materials.", footprint.total() as f64 / 1048576.0);
+    let mebibytes = footprint.total() as f64 / 1048576.0;
+    crate::print(format_args!("A renderer at 512x512 takes {mebibytes:.1} MiB before environments and materials."))?;
     Ok(ExitCode::SUCCESS)
 }

@@ -8,6 +8,9 @@ mod scenes;
 
 use clap::error::ErrorKind;
 use clap::{Parser, Subcommand};
+use passband::offline::error::{Error, Result};
+use std::fmt::Display;
+use std::io::Write;
 use std::process::ExitCode;
 
 /// Shades as often as the light field needs.
@@ -41,7 +44,7 @@ fn main() -> ExitCode {
     };
     // The one place where errors become exit codes: 2 for what was asked, 3 for the device.
     result.unwrap_or_else(|error| {
-        eprintln!("passband: {error}");
+        complain(&error);
         ExitCode::from(error.exit_code())
     })
 }
@@ -54,12 +57,30 @@ fn usage(error: &clap::Error) -> ExitCode {
         return ExitCode::SUCCESS;
     }
     if error.kind() == ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand {
-        eprintln!("passband: expected a subcommand, see passband --help");
+        complain("expected a subcommand, see passband --help");
         return ExitCode::from(2);
     }
     let text = error.render().to_string();
     let what = text.split("\n\nUsage:").next().unwrap_or_default().trim_start_matches("error: ");
     let what = what.split_whitespace().collect::<Vec<_>>().join(" ");
-    eprintln!("passband: {what}");
+    complain(what);
     ExitCode::from(2)
+}
+
+/// A line on standard output. A reader that has gone away is no failure; a full disk is.
+///
+/// # Errors
+/// [`Error::Write`] with the system's word.
+fn print(text: impl Display) -> Result<()> {
+    match writeln!(std::io::stdout(), "{text}") {
+        Err(e) if e.kind() != std::io::ErrorKind::BrokenPipe => {
+            Err(Error::Write { path: "standard output".into(), reason: e.to_string() })
+        }
+        _ => Ok(()),
+    }
+}
+
+/// A line on standard error; where there is none, the exit code has to do.
+fn complain(text: impl Display) {
+    let _ = writeln!(std::io::stderr(), "passband: {text}");
 }

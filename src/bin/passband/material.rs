@@ -44,10 +44,10 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         return Err(Error::argument("--output", "a name that ends in .png", output.display()));
     }
     let subject = load(&args.material)?;
-    report(&subject);
+    report(&subject)?;
     if let Some(output) = &args.output {
         plot::write(output, &subject.title, subject.reflectance.as_ref())?;
-        println!("\nplot: {}", output.display());
+        crate::print(format_args!("\nplot: {}", output.display()))?;
     }
     Ok(ExitCode::SUCCESS)
 }
@@ -94,16 +94,16 @@ fn packed(table: &MerlTable) -> MerlTable {
     MerlTable::unpacked(scale, &entries)
 }
 
-fn report(subject: &Subject) {
+fn report(subject: &Subject) -> Result<()> {
     let reflectance = subject.reflectance.as_ref();
-    println!("{}\n\nreflected share of light, over the view angle:", subject.title);
+    crate::print(format_args!("{}\n\nreflected share of light, over the view angle:", subject.title))?;
     let mut table = Table::new();
     table.load_style(presets::NOTHING).set_header(["degrees", "red", "green", "blue"]);
     for degrees in ANGLES {
         let rgb = albedo(reflectance, degrees).to_array().map(|c| format!("{c:.4}"));
         table.add_row([format!("{degrees}")].into_iter().chain(rgb));
     }
-    println!("{table}\n");
+    crate::print(format_args!("{table}\n"))?;
     let found = highlight(reflectance);
     let width = found.half_width.map_or("none".into(), |w| format!("{w:.2} degrees"));
     let bake = subject.baked;
@@ -114,5 +114,5 @@ fn report(subject: &Subject) {
     table.add_row(["half-width at half maximum".into(), width]);
     let error = format!("rms {:.2e}, median {:.2e}, 99 % {:.2e}", bake.rms, bake.median, bake.p99);
     table.add_row(["table on the GPU, relative error".into(), error]);
-    println!("{table}");
+    crate::print(table)
 }

@@ -5,7 +5,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use passband::Estimator;
 use passband::offline::error::{Error, Result};
 use passband::offline::headless::Options;
-use passband::offline::image_io::{LinearImage, write_atomically, write_image};
+use passband::offline::image_io::{LinearImage, check_writable, write_atomically, write_image};
 use passband::offline::metrics::{Exposure, encode};
 use passband::offline::render::{Settings, render};
 use passband::offline::scene::Scene;
@@ -191,6 +191,8 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     if !["exr", "png", "hdr"].contains(&extension.as_str()) {
         return Err(Error::argument("--output", "a name that ends in .exr, .png or .hdr", args.output.display()));
     }
+    // Before the work, not after it.
+    std::iter::once(&args.output).chain(&args.stats).try_for_each(|path| check_writable(path))?;
     let clock = Instant::now();
     let scene = Scene::load(&args.scene, &args.set)?;
     let world = scene.resolve()?;
@@ -211,7 +213,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         write_atomically(path, |file| std::io::Write::write_all(file, text.as_bytes()))?;
     }
     for message in &rendered.stats.validation_messages {
-        eprintln!("passband: validation: {message}");
+        crate::complain(format_args!("validation: {message}"));
     }
     Ok(if rendered.stats.validation_messages.is_empty() { ExitCode::SUCCESS } else { ExitCode::from(3) })
 }

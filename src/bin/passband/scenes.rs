@@ -17,6 +17,7 @@ pub fn run(_: &Args) -> Result<ExitCode> {
     for (name, description) in Scene::builtin_names() {
         table.add_row([name, description]);
     }
-    println!("{table}\n\nBuilt-in reflectances (synthetic tables): {}", stand_in::names().join(", "));
+    let names = stand_in::names().join(", ");
+    crate::print(format_args!("{table}\n\nBuilt-in reflectances (synthetic tables): {names}"))?;
     Ok(ExitCode::SUCCESS)
 }

@@ -9,9 +9,9 @@ use glam::{DMat4, DQuat, DVec3};
 use gltf::json::scene::{Node, UnitQuaternion};
 
 /// Vertices and corners that any file may have after flattening, and how many more for each byte of its buffers. A mesh
-/// that is there once has at most one vertex and one corner a byte.
-const ALWAYS_ALLOWED: u64 = 1 << 22;
-const MOST_PER_BYTE: u64 = 4;
+/// that is there once has at most one vertex and one corner a byte; many nodes may share one.
+const ALWAYS_ALLOWED: u64 = 1 << 20;
+const MOST_PER_BYTE: u64 = 16;
 
 /// A scene's triangles in world space, with the indices of their materials.
 pub(super) struct Flat {

@@ -48,7 +48,7 @@ pub fn read_exr(path: &Path) -> Result<LinearImage> {
             return Err(Error::file(path, At::File, "EXR part size", expected, got));
         }
     }
-    let reader = read().no_deep_data().largest_resolution_level().all_channels().all_layers().all_attributes();
+    let reader = read().no_deep_data().largest_resolution_level().all_channels().all_layers().all_attributes().non_parallel();
     let file = guarded(path, || reader.from_buffered(Cursor::new(&bytes)))?;
     let several = file.layer_data.len() > 1;
     let mut channels = Vec::new();
@@ -105,13 +105,13 @@ pub(crate) fn read_rgb(path: &Path, max: [u64; 2]) -> Result<RgbTexels> {
             let new = move |size, _: &(ChannelDescription,)| new(size, &());
             let channels = flat.specific_channels().required("Y");
             let channels = channels.collect_pixels(new, move |texels, at, (y,): (f32,)| put(texels, at, [y; 3]));
-            let image = channels.first_valid_layer().all_attributes().from_buffered(source)?;
+            let image = channels.first_valid_layer().all_attributes().non_parallel().from_buffered(source)?;
             Ok(image.layer_data.channel_data.pixels)
         } else {
             let new = move |size, _: &RgbChannels| new(size, &());
             let channels = flat.specific_channels().required("R").required("G").required("B");
             let channels = channels.collect_pixels(new, move |texels, at, (r, g, b): (f32, f32, f32)| put(texels, at, [r, g, b]));
-            let image = channels.first_valid_layer().all_attributes().from_buffered(source)?;
+            let image = channels.first_valid_layer().all_attributes().non_parallel().from_buffered(source)?;
             Ok(image.layer_data.channel_data.pixels)
         }
     })?;
@@ -119,11 +119,11 @@ pub(crate) fn read_rgb(path: &Path, max: [u64; 2]) -> Result<RgbTexels> {
 }
 
 /// Runs the decoder. On damaged tiled and B44 files it can trip over its own assertions (found by changing bytes at random):
-/// that is one more way to be malformed, not a reason to stop the process.
+/// that is one more way to be malformed, not a reason to stop the process. The decoder must stay on this thread: what
+/// trips in its own thread pool ends the process.
 fn guarded<T>(path: &Path, decode: impl FnOnce() -> exr::error::Result<T>) -> Result<T> {
-    let outcome = std::panic::catch_unwind(std::panic::AssertUnwindSafe(decode));
-    let inconsistent = |_| Err(exr::error::Error::Invalid("inconsistent blocks".into()));
-    outcome.unwrap_or_else(inconsistent).map_err(|e| malformed(path, e))
+    let inconsistent = || Err(exr::error::Error::Invalid("inconsistent blocks".into()));
+    input::caught(decode).unwrap_or_else(inconsistent).map_err(|e| malformed(path, e))
 }
 
 fn headers(path: &Path, bytes: &[u8]) -> Result<Vec<Header>> {
@@ -146,7 +146,7 @@ fn check_header(path: &Path, header: &Header, length: usize, max: [u64; 2]) -> R
     let ratio = match header.compression {
         Compression::Uncompressed => 1,
         Compression::DWAA(_) | Compression::DWAB(_) => u64::MAX,
-        _ => 4096,
+        _ => input::DEFLATE_RATIO,
     };
     // Each block has an eight-byte entry in the offset table.
     let least = (raw / ratio).max((header.chunk_count as u64).saturating_mul(8));

@@ -12,17 +12,18 @@ use std::path::Path;
 /// that the values are the scene's radiance.
 ///
 /// # Errors
-/// [`Error::File`] if it is unreadable, malformed, larger than 16384 x 16384 or longer than its bytes could hold.
+/// [`Error::File`] if it is unreadable, malformed, larger than 16384 x 16384 or larger than its bytes could hold.
 pub fn read_hdr(path: &Path) -> Result<LinearImage> {
     let bytes = input::read(path)?;
     let malformed = |e: image::ImageError| Error::file(path, At::File, "HDR", "a well-formed Radiance HDR image", e);
     let decoder = HdrDecoder::new(Cursor::new(&bytes)).map_err(malformed)?;
     let header = decoder.metadata();
     input::check_size(path, [header.width.into(), header.height.into()], [input::MAX_SIDE; 2])?;
-    // Every scan line holds at least one four-byte pixel.
-    let least = u64::from(header.height) * 4;
+    // Every scan line holds at least one four-byte pixel. A byte of run lengths makes at most 16 pixels, one of the older kind,
+    // whose runs can be chained without end, 64 as far as we go.
+    let least = u64::from(header.height) * (u64::from(header.width) / 64).max(4);
     if (bytes.len() as u64) < least {
-        let expected = format!("at least {least} bytes for {} rows", header.height);
+        let expected = format!("at least {least} bytes for {}x{}", header.width, header.height);
         return Err(Error::file(path, At::File, "HDR length", expected, format!("{} bytes", bytes.len())));
     }
     let exposure = header.exposure.unwrap_or(1.0);

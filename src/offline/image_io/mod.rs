@@ -9,7 +9,7 @@ mod exr_file;
 mod hdr_file;
 mod png_file;
 
-pub use atomic::write_atomically;
+pub use atomic::{check_writable, write_atomically};
 pub(crate) use exr_file::read_rgb as read_exr_rgb;
 pub use exr_file::{read_exr, write_exr};
 pub use hdr_file::{read_hdr, write_hdr};

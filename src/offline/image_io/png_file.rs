@@ -40,6 +40,12 @@ pub fn read_png(path: &Path) -> Result<Png> {
     let decoder = PngDecoder::new(Cursor::new(&bytes)).map_err(malformed)?;
     let (width, height) = decoder.dimensions();
     input::check_size(path, [width.into(), height.into()], [input::MAX_SIDE; 2])?;
+    // A palette's index of one bit becomes four bytes.
+    let least = decoder.total_bytes() / 32 / input::DEFLATE_RATIO;
+    if (bytes.len() as u64) < least {
+        let expected = format!("at least {least} bytes for {width}x{height}");
+        return Err(Error::file(path, At::File, "PNG length", expected, format!("{} bytes", bytes.len())));
+    }
     let pixels = DynamicImage::from_decoder(decoder).map_err(malformed)?;
     let channels = pixels.color().channel_count();
     let samples = match pixels {

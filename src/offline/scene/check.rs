@@ -117,6 +117,9 @@ impl Check<'_> {
         let affine = matrix.is_finite() && matrix.row(3).to_array() == [0.0, 0.0, 0.0, 1.0];
         let fits = affine && matrix.determinant().abs() > f64::MIN_POSITIVE;
         let expected = "an invertible column-major matrix whose last row is 0 0 0 1";
+        self.require(fits, &transform.span(), expected, format!("{:?}", transform.get_ref()))?;
+        let fits = transform.get_ref().iter().all(|c| single(*c)) && (1e-36..=1e36).contains(&matrix.determinant().abs());
+        let expected = "a matrix in single precision, with a determinant between 1e-36 and 1e36";
         self.require(fits, &transform.span(), expected, format!("{:?}", transform.get_ref()))
     }
 
@@ -207,18 +210,23 @@ impl Check<'_> {
 
     pub(super) fn number(&self, value: &Spanned<f64>, expected: &str, fits: impl Fn(f64) -> bool) -> Result<()> {
         let v = *value.get_ref();
-        self.require(v.is_finite() && fits(v), &value.span(), expected, v)
+        self.require(v.is_finite() && fits(v), &value.span(), expected, v)?;
+        self.require(single(v), &value.span(), SINGLE, format!("{v:e}"))
     }
 
     pub(super) fn vector(&mut self, value: &Spanned<Vector>) -> Result<()> {
         let v = value.get_ref();
-        self.require(v.iter().all(|c| c.is_finite()), &value.span(), "three finite numbers", format!("{v:?}"))
+        self.require(v.iter().all(|c| c.is_finite()), &value.span(), "three finite numbers", format!("{v:?}"))?;
+        self.require(v.iter().all(|c| single(*c)), &value.span(), SINGLE, format!("{v:?}"))
     }
 
     pub(super) fn scale(&mut self, value: &Spanned<Triple>) -> Result<()> {
         let Triple(v) = value.get_ref();
         let fits = v.iter().all(|c| c.is_finite() && *c != 0.0);
-        self.require(fits, &value.span(), "finite factors, none 0", format!("{v:?}"))
+        self.require(fits, &value.span(), "finite factors, none 0", format!("{v:?}"))?;
+        // The volume must be a number of single precision, too.
+        let sane = v.iter().all(|c| (1e-12..=1e12).contains(&c.abs()));
+        self.require(sane, &value.span(), "factors between 1e-12 and 1e12", format!("{v:?}"))
     }
 
     /// A colour that a surface reflects at most.
@@ -257,6 +265,14 @@ impl Check<'_> {
             [(first, _), (second, at), ..] => Err(self.source.error(at, expected, format!("{first} and {second}"))),
         }
     }
+}
+
+/// What is said of numbers that the GPU cannot hold.
+pub(super) const SINGLE: &str = "numbers that single precision holds";
+
+/// Whether a number stays finite in single precision.
+pub(super) fn single(value: f64) -> bool {
+    (value as f32).is_finite()
 }
 
 /// Where a key's value stands, if it is there.

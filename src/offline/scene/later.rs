@@ -1,7 +1,7 @@
 //! Rules for the keys that the format knows and this version cannot do yet: their values are checked like all others.
 
 use crate::offline::error::Result;
-use crate::offline::scene::check::{Check, span};
+use crate::offline::scene::check::{Check, SINGLE, span};
 use crate::offline::scene::format::{Animation, Settings, Vector};
 use glam::DVec3;
 use toml::Spanned;
@@ -72,7 +72,9 @@ impl Check<'_> {
     /// A finite vector that has a direction.
     pub(super) fn direction(&mut self, value: &Spanned<Vector>) -> Result<()> {
         let v = DVec3::from(*value.get_ref());
-        self.require(v.is_finite() && v.length() > 0.0, &value.span(), "a finite vector that is not 0", v)
+        let fits = v.is_finite() && v.length() > 0.0;
+        self.require(fits, &value.span(), "a finite vector that is not 0", v)?;
+        self.require(v.as_vec3().is_finite(), &value.span(), SINGLE, v)
     }
 
     /// A keyframe's number: within the animation and after the one before.

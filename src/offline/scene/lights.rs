@@ -1,7 +1,7 @@
 //! Lights of a scene file: their rules, and the lights themselves.
 
 use crate::offline::error::Result;
-use crate::offline::scene::check::{Check, span};
+use crate::offline::scene::check::{Check, single, span};
 use crate::offline::scene::format::{Key, Light, SceneFile, Triple, Vector};
 use glam::DVec3;
 use toml::Spanned;
@@ -48,7 +48,7 @@ impl Check<'_> {
         for colour in [&l.intensity, &l.irradiance, &l.radiance] {
             self.each(colour, |c, v| {
                 let Triple(rgb) = v.get_ref();
-                let fits = rgb.iter().all(|c| c.is_finite() && *c >= 0.0);
+                let fits = rgb.iter().all(|c| single(*c) && *c >= 0.0);
                 c.require(fits, &v.span(), "finite channels >= 0", format!("{rgb:?}"))
             })?;
         }
