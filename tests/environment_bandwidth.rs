@@ -18,7 +18,7 @@ fn on_device(map: &LatLong) -> (Vec<f32>, usize) {
     let headless = Headless::new(&options, &Requirements::of(&config)).unwrap();
     let camera = Camera { position: DVec3::Z, target: DVec3::ZERO, up: DVec3::Y, fov_y: 40.0 };
     let model = Model::Ggx(Ggx { alpha: 0.5, f0: DVec3::ONE, albedo: DVec3::ZERO });
-    let materials = vec![Material { name: "any".into(), model }];
+    let materials = vec![Material { name: "any".into(), model, maps: Default::default() }];
     let environment = Some(EnvironmentLight { map: map.clone(), intensity: 1.0, rotation: 0.0, visible: false });
     let world =
         World { name: "bandwidth".into(), camera, size: None, environment, objects: Vec::new(), materials, lights: Vec::new() };
