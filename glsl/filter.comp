@@ -1,7 +1,7 @@
 #version 460
-// What a surface's textures say at the pixel's scale: the shading normal, factors on the reflectance's colours and its
-// roughness. Filter `point`: colours through their mips by the footprint, normals and roughness from the base level.
-// src/material.rs is the f64 twin.
+// What a surface is at the pixel's scale: the shading normal, factors on the reflectance's colours, its roughness and what the
+// surface's own curvature adds to it. Filter `point`: colours through their mips by the footprint, normals and roughness from
+// the base level; `tk` adds the kernel of the interpolated normals' derivatives. src/material.rs is the f64 twin.
 #include "frame.glsl"
 #include "gbuffer.glsl"
 #include "tangent.glsl"
@@ -14,10 +14,14 @@ layout(constant_id = 0) const uint ALBEDO_CLASSES = 0u;
 layout(constant_id = 1) const uint SPECULAR_CLASSES = 0u;
 layout(constant_id = 2) const uint NORMAL_CLASSES = 0u;
 layout(constant_id = 3) const uint ROUGHNESS_CLASSES = 0u;
+// Whether the mesh's curvature within the pixel widens lobes.
+layout(constant_id = 4) const bool GEOMETRIC = false;
 
 struct MapRecord {
     uvec4 places;  // albedo, specular, normal, roughness: 0 for none, else (layer << 3 | class) + 1
-    vec4 tiling;   // factors on uv; rule of the roughness map; albedo factor without an albedo map
+    vec2 tiling;   // factors on uv
+    vec2 rule;     // of the roughness map; the greatest alpha that it gives
+    vec4 without;  // x: albedo factor without an albedo map
 };
 layout(set = 2, binding = 1, std430) readonly buffer Maps {
     MapRecord maps[]; // by material
@@ -33,13 +37,12 @@ layout(set = 2, binding = 9) uniform sampler2DArray textures_7;
 layout(set = 2, binding = 10, rgba32f) uniform writeonly image2D normals;   // shading normal; tangent as tangent.glsl encodes it
 layout(set = 2, binding = 11, rgba32ui) uniform writeonly uimage2D factors; // as factors.glsl packs them
 
-// Rules of a roughness map's value v, in the order of src/pass/maps.rs; the first two are v itself.
-const float RULE_CONCENTRATION = 1.0;
-const float RULE_ALPHA_OF_KAPPA = 2.0;  // sqrt(2 / v)
-const float RULE_EXPONENT_OF_ALPHA = 3.0; // 2 / v^2 - 2
-const float RULE_KAPPA_OF_ALPHA = 4.0;  // 2 / v^2
+// How a roughness map's value v becomes alpha, in the order of src/pass/maps.rs. A lobe's concentration is 2 / alpha^2, a
+// cosine's exponent 2 / alpha^2 - 2.
+const float RULE_KAPPA = 1.0;    // sqrt(2 / v)
+const float RULE_EXPONENT = 2.0; // sqrt(2 / (v + 2))
 const float LEAST_ALPHA = 1e-3;
-const float MOST_CONCENTRATION = 2.0 / (LEAST_ALPHA * LEAST_ALPHA);
+const float MOST_ALPHA = 6e4; // of a lobe without concentration, in 16-bit floating point
 
 // The level whose texels are as large as the longer derivative.
 float level(sampler2DArray t, vec4 footprint) {
@@ -70,13 +73,43 @@ vec4 look_up(uint classes, uint code, vec2 uv, vec4 footprint, bool base, vec4 w
     return value;
 }
 
-// The model's own parameter.
-float roughness_by_rule(float rule, float v) {
+float alpha_by_rule(float rule, float v, float most) {
     v = max(v, 0.0);
-    float concentration = rule == RULE_CONCENTRATION ? v : 2.0 / (v * v) - (rule == RULE_EXPONENT_OF_ALPHA ? 2.0 : 0.0);
-    float alpha = rule == RULE_ALPHA_OF_KAPPA ? sqrt(2.0 / v) : v;
-    bool concentrated = rule == RULE_CONCENTRATION || rule >= RULE_EXPONENT_OF_ALPHA;
-    return concentrated ? clamp(concentration, 0.0, MOST_CONCENTRATION) : clamp(alpha, LEAST_ALPHA, 1.0);
+    float alpha = rule == RULE_KAPPA ? sqrt(2.0 / v) : (rule == RULE_EXPONENT ? sqrt(2.0 / (v + 2.0)) : v);
+    return clamp(alpha, LEAST_ALPHA, most);
+}
+
+// Isotropic filtering of normal distributions by the derivatives of interpolated normals (Tokuyoshi and Kaplanyan 2021,
+// "Stable geometric specular antialiasing with projected-space NDF filtering", listing 5): twice the variance of the normal
+// within a pixel filter of variance 1/(2 pi), at most 0.18.
+const float FILTER_VARIANCE = 0.5 * INV_PI;
+const float MOST_KERNEL = 0.18;
+
+// The normal's change over one sample along an axis: central where both neighbours are of the same surface.
+vec3 normal_change(ivec2 p, ivec2 axis, vec3 n, float depth, uint object, float reach) {
+    vec3 sum = vec3(0.0);
+    float steps = 0.0;
+    for (int side = -1; side <= 1; side += 2) {
+        ivec2 q = p + axis * side;
+        bool inside = all(greaterThanEqual(q, ivec2(0))) && all(lessThan(q, ivec2(frame.extent.xy)));
+        q = inside ? q : p;
+        bool same = inside && gbuffer_covered(q) && gbuffer_object(q) == object && abs(gbuffer_depth(q) - depth) <= reach;
+        sum += same ? (gbuffer_normal(q) - n) * float(side) : vec3(0.0);
+        steps += same ? 1.0 : 0.0;
+    }
+    return sum / max(steps, 1.0);
+}
+
+float geometric_kernel(ivec2 p, vec3 n) {
+    float depth = gbuffer_depth(p);
+    uint object = gbuffer_object(p);
+    // As far as a plane of this tilt changes in depth over a few samples.
+    float facing = max(abs(dot(n, normalize(frame_ray(p)))), 0.02);
+    float footprint = depth * max(abs(frame.ray.x) * 2.0 / float(frame.extent.x), abs(frame.ray.y) * 2.0 / float(frame.extent.y));
+    float reach = 4.0 * footprint / facing;
+    vec3 x = normal_change(p, ivec2(1, 0), n, depth, object, reach);
+    vec3 y = normal_change(p, ivec2(0, 1), n, depth, object, reach);
+    return min(2.0 * FILTER_VARIANCE * (dot(x, x) + dot(y, y)), MOST_KERNEL);
 }
 
 void main() {
@@ -85,18 +118,22 @@ void main() {
         return;
     }
     MapRecord record = maps[gbuffer_material(p)];
-    vec2 uv = gbuffer_uv(p) * record.tiling.xy;
+    vec2 uv = gbuffer_uv(p) * record.tiling;
     vec4 footprint = gbuffer_footprint(p) * record.tiling.xyxy;
     vec3 n = gbuffer_normal(p);
     vec4 t = gbuffer_tangent(p);
 
     Factors f;
-    f.albedo = look_up(ALBEDO_CLASSES, record.places.x, uv, footprint, false, vec4(record.tiling.w)).rgb;
+    f.albedo = look_up(ALBEDO_CLASSES, record.places.x, uv, footprint, false, vec4(record.without.x)).rgb;
     f.specular = look_up(SPECULAR_CLASSES, record.places.y, uv, footprint, false, vec4(1.0)).rgb;
-    f.roughness = NO_ROUGHNESS;
+    f.alpha = NO_ALPHA;
     if (ROUGHNESS_CLASSES != 0u) {
         float v = look_up(ROUGHNESS_CLASSES, record.places.w, uv, footprint, true, vec4(1.0)).x;
-        f.roughness = record.places.w != 0u ? roughness_by_rule(record.tiling.z, v) : NO_ROUGHNESS;
+        f.alpha = record.places.w != 0u ? alpha_by_rule(record.rule.x, v, record.rule.y) : NO_ALPHA;
+    }
+    f.kernel = 0.0;
+    if (GEOMETRIC) {
+        f.kernel = geometric_kernel(p, n);
     }
     if (NORMAL_CLASSES != 0u) {
         vec2 xy = look_up(NORMAL_CLASSES, record.places.z, uv, footprint, true, vec4(0.0)).xy;

@@ -1,6 +1,9 @@
 #version 460
 // Reflected radiance of listed samples by N directions each (Bagher 2011, equations 1 and 2, section 3.3): half from the
 // reflectance, half from the environment, combined by the balance heuristic; or all from the reflectance.
+// Whether the filter widens lobes.
+layout(constant_id = 3) const bool KERNEL = false;
+#define MATERIAL_KERNEL KERNEL
 #include "frame.glsl"
 #include "gbuffer.glsl"
 #include "materials.glsl"

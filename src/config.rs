@@ -32,6 +32,17 @@ pub enum Rate {
     Given,
 }
 
+/// How a material is read at a pixel's scale.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Filter {
+    /// At the pixel's centre: colours through their mips, normals and roughness as they are there.
+    #[default]
+    Point,
+    /// The same, with lobes widened by how far the interpolated normal turns within the pixel: geometric specular antialiasing
+    /// (Tokuyoshi and Kaplanyan 2021). Tabulated reflectances stay as they are.
+    Tk,
+}
+
 /// Where the G-buffer comes from.
 #[derive(Clone, Copy, Debug, Default)]
 pub enum GBufferSource {
@@ -63,6 +74,10 @@ pub struct Config {
     pub rate: Rate,
     /// Coarsest level of [`Rate::Given`], 0 to 5, in output pixels; no cell is wider than 32 samples.
     pub lmax: u32,
+    /// How materials are read.
+    pub filter: Filter,
+    /// Whether the mesh's curvature widens lobes as [`Filter::Tk`] does, whatever the filter.
+    pub geometric: bool,
     /// Directions a shaded sample, 1 to 65536; at least 2 for [`Estimator::Mis`].
     pub directions: u32,
     /// Whether the curvature pass runs (an output of its own until something in the frame reads it).
@@ -83,11 +98,18 @@ impl Config {
             estimator: Estimator::default(),
             rate: Rate::default(),
             lmax: 3,
+            filter: Filter::default(),
+            geometric: false,
             directions: 64,
             curvature: false,
             gbuffer: GBufferSource::default(),
             modules: Modules::default(),
         }
+    }
+
+    /// Whether the mesh's curvature widens lobes.
+    pub(crate) fn widened(&self) -> bool {
+        self.geometric || self.filter == Filter::Tk
     }
 
     /// The coarsest level of shading, in levels over a sample: 0 where every sample is shaded.

@@ -83,6 +83,21 @@ pub struct PointMaterial {
     pub specular: DVec3,
     /// The model's alpha, exponent or concentration, if there is a map of it.
     pub roughness: Option<f64>,
+    /// What is added to the square of alpha, that is to 2 / concentration of every lobe: how far the normal turns within the
+    /// pixel. Tables have no such parameter and stay as they are.
+    pub kernel: f64,
+}
+
+/// The variance of a pixel filter, and the most that is added to the square of alpha (Tokuyoshi and Kaplanyan 2021, "Stable
+/// geometric specular antialiasing with projected-space NDF filtering", listing 5).
+const FILTER_VARIANCE: f64 = 0.5 / PI;
+/// The most that [`geometric_kernel`] adds to the square of alpha.
+pub const MOST_KERNEL: f64 = 0.18;
+
+/// [`PointMaterial::kernel`] where the interpolated normal changes by `dx` and `dy` from one sample to the next: twice its
+/// variance within the pixel (the same, isotropic form).
+pub fn geometric_kernel(dx: DVec3, dy: DVec3) -> f64 {
+    (2.0 * FILTER_VARIANCE * (dx.length_squared() + dy.length_squared())).min(MOST_KERNEL)
 }
 
 impl Material {
@@ -129,6 +144,7 @@ impl Material {
             albedo: albedo.as_ref().map_or(without, colour),
             specular: specular.as_ref().map_or(DVec3::ONE, colour),
             roughness: roughness.as_ref().map(|(map, kind)| self.model.roughness_from(*kind, map.sample(place, 0.0).x)),
+            kernel: 0.0,
         }
     }
 }
@@ -171,15 +187,22 @@ impl PointMaterial {
         let specular = |c: DVec3| at_most_one(c * self.specular);
         match model {
             Model::Ggx(g) => {
-                plain(Model::Ggx(Ggx { alpha: self.roughness.unwrap_or(g.alpha), f0: specular(g.f0), albedo: albedo(g.albedo) }))
+                let alpha = self.roughness.unwrap_or(g.alpha);
+                let alpha = if self.kernel > 0.0 { (alpha * alpha + self.kernel).min(1.0).sqrt() } else { alpha };
+                plain(Model::Ggx(Ggx { alpha, f0: specular(g.f0), albedo: albedo(g.albedo) }))
             }
-            Model::BlinnPhong(b) => plain(Model::BlinnPhong(BlinnPhong {
-                exponent: self.roughness.unwrap_or(b.exponent),
-                specular: specular(b.specular),
-                albedo: albedo(b.albedo),
-            })),
+            Model::BlinnPhong(b) => {
+                let exponent = self.roughness.unwrap_or(b.exponent);
+                let exponent =
+                    if self.kernel > 0.0 { 2.0 / (2.0 / (exponent + 2.0) + self.kernel).min(1.0) - 2.0 } else { exponent };
+                plain(Model::BlinnPhong(BlinnPhong { exponent, specular: specular(b.specular), albedo: albedo(b.albedo) }))
+            }
             Model::Vmf(vmf) => PointReflectance {
-                model: self.roughness.map_or_else(|| model.clone(), |kappa| Model::Vmf(Arc::new(vmf.with_concentration(kappa)))),
+                model: match self.roughness {
+                    None if self.kernel > 0.0 => Model::Vmf(Arc::new(vmf.widened(self.kernel))),
+                    None => model.clone(),
+                    Some(kappa) => Model::Vmf(Arc::new(vmf.with_concentration(2.0 / (2.0 / kappa + self.kernel)))),
+                },
                 scale: self.specular,
                 base: albedo(DVec3::ONE),
             },

@@ -159,10 +159,10 @@ impl Renderer {
         memory: &mut dyn HostAllocator,
     ) -> Result<Retired> {
         let bridge = BridgeLayouts { gbuffer: layout(&self.passes.gbuffer, &self.config), materials: self.bridge.layout };
-        let (modules, slots) = (&self.config.modules, self.config.frames_in_flight);
+        let (modules, slots, widened) = (&self.config.modules, self.config.frames_in_flight, self.config.widened());
         let (upload, filter) = Build::run(&self.cx, memory, |build| {
-            let upload = MaterialsUpload::new(build, materials)?;
-            let filter = filter::Filter::new(&mut PassContext { build, modules, bridge, slots }, upload.uses())?;
+            let upload = MaterialsUpload::new(build, materials, widened)?;
+            let filter = filter::Filter::new(&mut PassContext { build, modules, bridge, slots }, upload.uses(), widened)?;
             Ok((upload, filter))
         })?;
         let mut bag = Retired::default();
@@ -432,7 +432,7 @@ impl Passes {
             curvature: config.curvature.then(|| curvature::Curvature::new(&mut p)).transpose()?,
             pyramid: (top > 0).then(|| pyramid::Pyramid::new(&mut p, top)).transpose()?,
             classify: classify::Classify::new(&mut p, top)?,
-            shade: shade::Shade::new(&mut p, config.estimator, top > 0)?,
+            shade: shade::Shade::new(&mut p, config, top > 0)?,
             upsample: (top > 0).then(|| upsample::Upsample::new(&mut p, top)).transpose()?,
             resolve: resolve::Resolve::new(&mut p)?,
             tonemap: tonemap::Tonemap::new(&mut p)?,

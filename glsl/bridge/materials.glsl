@@ -10,6 +10,11 @@
 #include "vmf.glsl"
 #include "factors.glsl"
 
+// Whether a filter widens lobes: a pass that reads what the filter wrote defines it as its specialization constant.
+#ifndef MATERIAL_KERNEL
+#define MATERIAL_KERNEL false
+#endif
+
 const uint REFLECTANCE_TABLE = 0u;
 const uint REFLECTANCE_GGX = 1u;
 const uint REFLECTANCE_BLINN_PHONG = 2u;
@@ -31,13 +36,13 @@ const float TABLE_BORDER = 0.5 + 1.0 / 8192.0;
 // By kind:           table               GGX              Blinn-Phong         vMF                turned tables
 //   kind.yz          place in the atlas                                       first lobe, lobes  first table, tables
 //   f0               1; -                F0; alpha        specular; exponent  1; mean z of lobes 1; tables per radian
-//   albedo           w: scale            albedo           albedo              1                  w: scale
+//   albedo           w: scale            albedo           albedo              1; 2 / sharpest    w: scale
 // A lobe is a record of its own: mean direction and concentration in f0, its density at the centre and its weight in albedo.xy.
 struct MaterialRecord {
     uvec4 kind;      // x: kind of reflectance
     vec4 f0;
     vec4 albedo;
-    vec4 importance; // first of its importance tables; the number of the last step; log2 of the roughness of the first; steps per log2
+    vec4 importance; // first of its importance tables; the number of the last step; log2 of alpha squared of the first; steps per log2
 };
 
 layout(set = 1, binding = 0, std430) readonly buffer Materials {
@@ -55,6 +60,8 @@ struct Material {
     vec2 table;      // first texel of its table in y, z
     vec3 turn;       // cosine and sine of the angle from the tangent frame's x axis to the local one; handedness
     vec2 lobe;       // concentration and density at the centre of a lobe of weight 1, where a map replaces the lobes' own
+    float kernel;    // added to 2 / concentration of the lobes' own
+    float area;      // projected area of the lobes so widened
 };
 
 Material material_load(uint id, float cos_o, vec3 turn, Factors factors) {
@@ -63,17 +70,38 @@ Material material_load(uint id, float cos_o, vec3 turn, Factors factors) {
     uint kind = m.record.kind.x;
     bool table = kind == REFLECTANCE_TABLE || kind == REFLECTANCE_TURNED;
     bool vmf = kind == REFLECTANCE_VMF;
-    bool rough = factors.roughness != NO_ROUGHNESS;
     vec3 f0 = m.record.f0.rgb * (table ? factors.albedo : factors.specular);
     m.record.f0.rgb = table || vmf ? f0 : min(f0, 1.0);
     m.record.albedo.rgb = min(m.record.albedo.rgb * factors.albedo, 1.0);
-    float facing = vmf_mean_cosine(factors.roughness) * m.record.f0.w;
-    m.lobe = rough ? vec2(factors.roughness, vmf_normalisation(factors.roughness) / max(facing, LEAST_PROJECTED_AREA)) : vec2(0.0);
-    m.record.f0.w = rough && !table && !vmf ? factors.roughness : m.record.f0.w;
+
+    // Alpha squared: a lobe's is 2 / concentration, a cosine's 2 / (exponent + 2).
+    bool rough = factors.alpha != NO_ALPHA;
+    bool cosine = kind == REFLECTANCE_BLINN_PHONG;
+    float own = m.record.f0.w;
+    float square = vmf ? m.record.albedo.w : (cosine ? 2.0 / (own + 2.0) : own * own);
+    square = (rough ? factors.alpha * factors.alpha : square) + factors.kernel;
+    bool changed = rough || factors.kernel > 0.0;
+    float narrow = min(square, 1.0);
+    m.record.f0.w = changed && !table && !vmf ? (cosine ? 2.0 / narrow - 2.0 : sqrt(narrow)) : own;
+    float kappa = 2.0 / square;
+    float facing = vmf_mean_cosine(kappa) * own;
+    m.lobe = rough ? vec2(kappa, vmf_normalisation(kappa) / max(facing, LEAST_PROJECTED_AREA)) : vec2(0.0);
+    m.kernel = 0.0;
+    m.area = 1.0;
+    if (MATERIAL_KERNEL) {
+        m.kernel = rough ? 0.0 : factors.kernel;
+        float area = 0.0, weight = 0.0;
+        for (uint i = 0u; i < (vmf ? m.record.kind.z : 1u); ++i) {
+            MaterialRecord lobe = materials[vmf ? m.record.kind.y + i : 0u];
+            area += lobe.albedo.y * vmf_mean_cosine(lobe.f0.w / (1.0 + 0.5 * lobe.f0.w * m.kernel)) * lobe.f0.z;
+            weight += lobe.albedo.y;
+        }
+        m.area = max(area / weight, LEAST_PROJECTED_AREA);
+    }
 
     uint angle = min(uint(acos_positive(clamp(cos_o, 0.0, 1.0)) * (2.0 * INV_PI * float(IMPORTANCE_ANGLES))), IMPORTANCE_ANGLES - 1u);
     vec4 steps = m.record.importance;
-    float step_number = rough ? round((log2(max(factors.roughness, 1e-9)) - steps.z) * steps.w) : 0.0;
+    float step_number = changed ? round((log2(square) - steps.z) * steps.w) : 0.0;
     uint tile = uint(steps.x + clamp(step_number, 0.0, steps.y));
     uvec2 at = uvec2((tile >> 6) * IMPORTANCE_ANGLES + angle, tile & 63u);
     m.cell = ivec2(at * uvec2(IMPORTANCE_COLUMNS, IMPORTANCE_ROWS));
@@ -134,8 +162,14 @@ float material_distribution(Material m, vec3 h, vec3 t) {
         MaterialRecord lobe = materials[vmf ? m.record.kind.y + i : 0u];
         vec3 d = t - lobe.f0.xyz;
         bool own = m.lobe.y == 0.0;
-        float exponent = vmf ? -0.5 * (own ? lobe.f0.w : m.lobe.x) * dot(d, d) : blinn_phong_exponent(m.record.f0.a, h);
+        float kappa = own ? lobe.f0.w : m.lobe.x;
         float peak = own ? lobe.albedo.x : lobe.albedo.y * m.lobe.y;
+        if (MATERIAL_KERNEL) {
+            bool widened = m.kernel > 0.0;
+            kappa = widened ? kappa / (1.0 + 0.5 * kappa * m.kernel) : kappa;
+            peak = widened ? lobe.albedo.y * vmf_normalisation(kappa) / m.area : peak;
+        }
+        float exponent = vmf ? -0.5 * kappa * dot(d, d) : blinn_phong_exponent(m.record.f0.a, h);
         sum += (vmf ? peak : blinn_phong_peak(m.record.f0.a)) * exp(exponent);
     }
     return sum;

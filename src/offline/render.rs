@@ -10,7 +10,7 @@ use crate::offline::session::Session;
 use crate::offline::stats::{Pixels, Quantiles, Samples, Stats, pass_times};
 use crate::offline::world::World;
 use crate::plan::Directions;
-use crate::{Config, Estimator, Rate, Requirements};
+use crate::{Config, Estimator, Filter, Rate, Requirements};
 use serde_json::json;
 use std::collections::BTreeMap;
 
@@ -30,6 +30,10 @@ pub struct Settings {
     pub rate: Rate,
     /// Coarsest level, in output pixels; `None` is the default.
     pub lmax: Option<u32>,
+    /// How materials are read.
+    pub filter: Filter,
+    /// Whether the mesh's curvature widens lobes, whatever the filter.
+    pub geometric: bool,
     /// Directions a shaded sample.
     pub samples: u32,
     /// Estimator.
@@ -57,6 +61,8 @@ impl Settings {
             estimator: if self.reference.is_some() { Estimator::Mis } else { self.estimator },
             rate: if self.reference.is_some() { Rate::Full } else { self.rate },
             lmax: self.lmax.unwrap_or(base.lmax),
+            filter: self.filter,
+            geometric: self.geometric,
             directions: self.reference.map_or(self.samples, |n| n.min(REFERENCE_CHUNK)),
             curvature: self.aovs.iter().any(|a| a.needs_curvature()),
             ..base
@@ -147,7 +153,8 @@ fn statistics(
     let values = BTreeMap::from([
         ("rate", json!(rate)),
         ("lmax", json!(config.lmax)),
-        ("filter", json!("point")),
+        ("filter", json!(if config.filter == Filter::Tk { "tk" } else { "point" })),
+        ("geometric", json!(config.geometric)),
         ("estimator", json!(estimator)),
         ("samples", json!(config.directions)),
         ("aa", json!(config.samples_per_side.pow(2))),

@@ -54,8 +54,11 @@ pub(crate) struct Io<'a> {
 pub(crate) struct Filter(ComputePipeline);
 
 impl Filter {
-    pub fn new(p: &mut PassContext<'_, '_>, uses: Uses) -> Result<Self> {
-        Ok(Self(ComputePipeline::new(p.build, p.modules, &INTERFACE, p.bridge, p.slots, &uses)?))
+    /// `geometric` says whether the mesh's curvature widens lobes.
+    pub fn new(p: &mut PassContext<'_, '_>, uses: Uses, geometric: bool) -> Result<Self> {
+        let [albedo, specular, normal, roughness] = uses;
+        let constants = [albedo, specular, normal, roughness, u32::from(geometric)];
+        Ok(Self(ComputePipeline::new(p.build, p.modules, &INTERFACE, p.bridge, p.slots, &constants)?))
     }
 
     pub fn record(&self, rec: &mut Recorder<'_>, io: &Io<'_>) {

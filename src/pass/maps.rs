@@ -21,7 +21,9 @@ pub(crate) type Uses = [u32; 4];
 #[derive(Clone, Copy, Pod, Zeroable)]
 struct Record {
     places: [u32; 4],
-    tiling: [f32; 4],
+    tiling: [f32; 2],
+    rule: [f32; 2],
+    without: [f32; 4],
 }
 
 /// What the `filter` pass reads.
@@ -37,17 +39,20 @@ pub(crate) struct MapsUpload {
     pub uses: Uses,
 }
 
-/// How the shader turns a roughness map's value into the model's parameter.
-fn rule(material: &Material) -> f32 {
-    let Some((_, kind)) = &material.maps.roughness else { return 0.0 };
+/// How the shader turns a roughness map's value into alpha, and the greatest alpha that comes of it.
+fn rule(material: &Material) -> [f32; 2] {
+    let Some((_, kind)) = &material.maps.roughness else { return [0.0, 1.0] };
     match (&material.model, kind) {
-        (Model::Ggx(_) | Model::Table(_) | Model::Turned(_), Roughness::Alpha) => 0.0,
-        (Model::BlinnPhong(_) | Model::Vmf(_), Roughness::Kappa) => 1.0,
-        (Model::Ggx(_) | Model::Table(_) | Model::Turned(_), Roughness::Kappa) => 2.0,
-        (Model::BlinnPhong(_), Roughness::Alpha) => 3.0,
-        (Model::Vmf(_), Roughness::Alpha) => 4.0,
+        (Model::Vmf(_), Roughness::Alpha) => [0.0, MOST_ALPHA],
+        (Model::Vmf(_), Roughness::Kappa) => [1.0, MOST_ALPHA],
+        (_, Roughness::Alpha) => [0.0, 1.0],
+        (Model::BlinnPhong(_), Roughness::Kappa) => [2.0, 1.0],
+        (_, Roughness::Kappa) => [1.0, 1.0],
     }
 }
+
+/// Of a lobe without concentration, in 16-bit floating point.
+const MOST_ALPHA: f32 = 6e4;
 
 fn format(format: Format) -> vk::Format {
     match format {
@@ -84,7 +89,7 @@ impl MapsUpload {
             let places = slots.map(|slot| slot.map_or(0, |(class, layer)| (layer << 3 | class) as u32 + 1));
             let [u, v] = material.maps.tiling;
             let without = if matches!(material.model, Model::Vmf(_)) { 0.0 } else { 1.0 };
-            records.push(Record { places, tiling: [u, v, rule(material), without] });
+            records.push(Record { places, tiling: [u, v], rule: rule(material), without: [without; 4] });
         }
         if classes.is_empty() {
             // Something to bind.

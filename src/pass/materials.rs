@@ -12,7 +12,7 @@ use crate::gpu::upload::{BufferUpload, ImageUpload};
 use crate::material::Material;
 use crate::pass::maps::{MapImages, MapsUpload, Uses};
 use crate::reflectance::importance::{COLUMNS, DENSITY_COLUMNS, DENSITY_ROWS, ImportanceTable, ROWS, VIEW_ANGLES};
-use crate::reflectance::ladder::Ladder;
+use crate::reflectance::ladder::{Ladder, own_square};
 use crate::reflectance::merl::{PHI_DIFF, THETA_DIFF, THETA_HALF};
 use crate::reflectance::{Lobe, MerlTable, Model};
 use ash::vk;
@@ -135,7 +135,8 @@ fn records(materials: &[Material], tables: &Tables<'_>, importance: &[[f32; 4]],
                     };
                     lobes.extend(vmf.lobes().iter().zip(vmf.peaks()).map(lobe));
                     let kind = [3, first as u32, vmf.lobes().len() as u32, 0];
-                    record(kind, with(DVec3::ONE, facing / weight), [1.0; 4])
+                    let sharpest = own_square(model).unwrap_or(1.0);
+                    record(kind, with(DVec3::ONE, facing / weight), with(DVec3::ONE, sharpest))
                 }
                 Model::Turned(turned) => {
                     let kind = [4, slot, turned.nodes().len() as u32, 0];
@@ -161,7 +162,8 @@ fn importance_tables(materials: &[Material], ladders: &[Ladder]) -> Vec<Importan
 }
 
 impl MaterialsUpload {
-    pub fn new(build: &mut Build<'_>, materials: &[Material]) -> Result<Self> {
+    /// `widened` says whether a filter widens lobes.
+    pub fn new(build: &mut Build<'_>, materials: &[Material], widened: bool) -> Result<Self> {
         if materials.is_empty() || materials.len() > MAX_MATERIALS {
             return Err(Error::invalid("materials", format!("1 to {MAX_MATERIALS}"), materials.len()));
         }
@@ -177,7 +179,7 @@ impl MaterialsUpload {
             .ok_or_else(|| Error::invalid("materials", format!("tables that fit a 3-D image of side {limit}"), tables.all.len()))?
             .1;
         let packed: Vec<_> = tables.all.iter().map(|(table, scale)| table.packed_at(*scale)).collect();
-        let ladders: Vec<_> = materials.iter().map(Ladder::of).collect();
+        let ladders: Vec<_> = materials.iter().map(|m| Ladder::of(m, widened)).collect();
         let firsts = ladders.iter().scan(0, |next, ladder| Some(std::mem::replace(next, *next + ladder.steps())));
         let places: Vec<_> = ladders.iter().zip(firsts).map(|(ladder, first)| ladder.record(first)).collect();
         let records = records(materials, &tables, &places, atlas[0]);

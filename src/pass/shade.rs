@@ -1,6 +1,6 @@
 //! Pass 8: reflected radiance of the listed samples (Bagher 2011, equations 1 and 2, section 3.3).
 
-use crate::config::Estimator;
+use crate::config::{Config, Estimator};
 use crate::error::Result;
 use crate::gpu::access::Access;
 use crate::gpu::buffer::Buffer;
@@ -74,15 +74,15 @@ pub(crate) struct Shade([ComputePipeline; 2]);
 
 impl Shade {
     /// `levelled` says whether entries of the list stand for cells of levels.
-    pub fn new(p: &mut PassContext<'_, '_>, estimator: Estimator, levelled: bool) -> Result<Self> {
-        let constant = match estimator {
+    pub fn new(p: &mut PassContext<'_, '_>, config: &Config, levelled: bool) -> Result<Self> {
+        let constant = match config.estimator {
             Estimator::Mis => 0,
             Estimator::Brdf => 1,
             Estimator::BrdfRandom => 2,
             Estimator::Lookup => 3,
         };
         let mut make = |lights| {
-            let constants = [constant, lights, u32::from(levelled)];
+            let constants = [constant, lights, u32::from(levelled), u32::from(config.widened())];
             ComputePipeline::new(p.build, p.modules, &INTERFACE, p.bridge, p.slots, &constants)
         };
         Ok(Self([make(0)?, make(1)?]))

@@ -86,6 +86,15 @@ impl Vmf {
         Self::over((mean_cosine(kappa) * facing / weight).max(LEAST_PROJECTED_AREA), lobes)
     }
 
+    /// The mixture with `kernel` added to every lobe's 2 / concentration; its projected area as in [`Self::with_concentration`].
+    pub(crate) fn widened(&self, kernel: f64) -> Self {
+        let widen = |l: &Lobe| Lobe { kappa: l.kappa / (1.0 + 0.5 * l.kappa * kernel), ..*l };
+        let lobes: Vec<_> = self.lobes.iter().map(widen).collect();
+        let weight: f64 = lobes.iter().map(|l| l.weight).sum();
+        let facing: f64 = lobes.iter().map(|l| l.weight * mean_cosine(l.kappa) * l.mu.z).sum();
+        Self::over((facing / weight).max(LEAST_PROJECTED_AREA), lobes)
+    }
+
     /// The lobes, mean directions of length one.
     pub fn lobes(&self) -> &[Lobe] {
         &self.lobes

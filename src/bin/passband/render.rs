@@ -2,7 +2,6 @@
 
 use clap::ValueEnum;
 use indicatif::{ProgressBar, ProgressStyle};
-use passband::Estimator;
 use passband::offline::error::{Error, Result};
 use passband::offline::headless::Options;
 use passband::offline::image_io::{LinearImage, check_writable, write_atomically, write_image};
@@ -10,6 +9,7 @@ use passband::offline::metrics::{Exposure, encode};
 use passband::offline::render::{Settings, render};
 use passband::offline::scene::Scene;
 use passband::sampling::luminance;
+use passband::{Estimator, Filter};
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Instant;
@@ -142,7 +142,7 @@ fn assignment(text: &str) -> std::result::Result<(String, String), String> {
 }
 
 impl Args {
-    fn settings(&self, scene_size: Option<[u32; 2]>, lmax: Option<u32>) -> Result<Settings> {
+    fn settings(&self, scene_size: Option<[u32; 2]>, scene: Option<&Scene>) -> Result<Settings> {
         let later = |yes: bool, what: &str| if yes { Err(Error::NotSupportedYet { what: what.into() }) } else { Ok(()) };
         let rate = match self.rate {
             Rate::Full => passband::Rate::Full,
@@ -163,7 +163,11 @@ impl Args {
         if !FILTERS.contains(&self.filter.as_str()) && self.filter != "supersample" {
             return Err(Error::argument("--filter", format!("one of {}, supersample", FILTERS.join(", ")), &self.filter));
         }
-        later(self.filter != "point", "--filter other than point")?;
+        let filter = match self.filter.as_str() {
+            "point" => Filter::Point,
+            "tk" => Filter::Tk,
+            _ => return Err(Error::NotSupportedYet { what: "--filter other than point and tk".into() }),
+        };
         later(self.probes.is_some(), "--probes")?;
         later(self.spc.is_some(), "--spc")?;
         later(self.frames.is_some(), "--frames")?;
@@ -171,7 +175,9 @@ impl Args {
         Ok(Settings {
             extent: self.size.or(scene_size).unwrap_or([512, 512]),
             rate,
-            lmax,
+            lmax: scene.and_then(Scene::lmax),
+            filter,
+            geometric: scene.is_some_and(Scene::geometric),
             samples: self.samples,
             estimator,
             samples_per_side: self.aa,
@@ -197,7 +203,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let scene = Scene::load(&args.scene, &args.set)?;
     let world = scene.resolve()?;
     let loading = clock.elapsed().as_secs_f64() * 1e3;
-    let settings = args.settings(world.size, scene.lmax())?;
+    let settings = args.settings(world.size, Some(&scene))?;
 
     let style = ProgressStyle::with_template("{msg} {bar:30} {pos}/{len} {eta}").unwrap_or_else(|_| ProgressStyle::default_bar());
     let bar = ProgressBar::new(1).with_style(style).with_message("frames");

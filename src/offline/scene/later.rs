@@ -63,7 +63,6 @@ impl Check<'_> {
             span(&s.eps1),
             span(&s.anisotropy),
             span(&s.lod_bias),
-            span(&s.geometric),
         ];
         self.later.extend(all.into_iter().flatten());
         Ok(())

@@ -91,6 +91,11 @@ impl Scene {
         self.file.settings.lmax.as_ref().map(|v| *v.get_ref())
     }
 
+    /// Whether the mesh's curvature widens lobes, whatever the filter.
+    pub fn geometric(&self) -> bool {
+        self.file.settings.geometric.as_ref().is_some_and(|v| *v.get_ref())
+    }
+
     /// Names of the built-in scenes, each with a line that describes it.
     pub fn builtin_names() -> Vec<(&'static str, &'static str)> {
         let describe = |text: &'static str| text.lines().next().unwrap_or_default().trim_start_matches(['#', ' ']);
