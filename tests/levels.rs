@@ -110,7 +110,7 @@ fn cells_are_what_all_their_samples_say() {
             assert_eq!([width, height], extent.map(|e| e.div_ceil(1 << level)));
             for i in 0..width * height {
                 let [x, y] = [i % width, i / width];
-                let inside = |s: &usize| s % extent[0] >> level == x && s / extent[0] >> level == y;
+                let inside = |s: &usize| (s % extent[0]) >> level == x && (s / extent[0]) >> level == y;
                 let covered: Vec<_> =
                     (0..extent[0] * extent[1]).filter(inside).filter(|s| surface.samples[*s].is_some()).collect();
                 let least = covered.iter().map(|s| u32::from(map[*s]).min(5)).min();
@@ -439,7 +439,7 @@ fn objects_do_not_bleed_into_each_other() {
         let ids: Vec<u32> = bytemuck::pod_collect_to_vec(&session.image("ids").unwrap().0);
         let mut seen = [0; 2];
         for (texel, id) in texels.iter().zip(ids).filter(|(_, id)| *id != 0) {
-            let object = (id - 1 >> 16) as usize;
+            let object = ((id - 1) >> 16) as usize;
             seen[object] += 1;
             let fits = if object == 0 { texel[1] == 0.0 } else { texel[1] > 0.7 };
             assert!(fits, "level {level}, object {object}: {texel:?}");
