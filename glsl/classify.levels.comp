@@ -143,7 +143,7 @@ void main() {
     for (int k = 0; k < 4; ++k) {
         ivec2 c = states[k] == CHILD_NONE ? ivec2(0) : cell * 2 + ivec2(k & 1, k >> 1);
         at[k] = c;
-        if (TOP > 1) {
+        if (TOP != 1) {
             ivec2 place = cell_place(cells[l > 1 ? cell_index(l - 1, c) : 0].word);
             at[k] = l > 1 ? (c << (l - 1)) + place : c;
         }

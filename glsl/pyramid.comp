@@ -10,7 +10,7 @@
 // An invocation makes a cell of level 2 and its children; a group goes on to level 5.
 layout(local_size_x = 8, local_size_y = 8) in;
 
-layout(constant_id = 0) const int TOP = 3;
+layout(constant_id = 0) const int TOP = 3; // `TOP / l != 0` is TOP >= l in operations that reflection libraries evaluate
 
 layout(set = 2, binding = 1) uniform usampler2D level; // of each sample
 layout(set = 2, binding = 2, std430) writeonly buffer Cells {
@@ -107,13 +107,13 @@ void main() {
     uint slots[LEVELS];
     slots[1] = atomicAdd(counts[1], count(f0) + count(f1) + count(f2) + count(f3));
     Found up[LEVELS];
-    if (TOP >= 2) {
+    if (TOP / 2 != 0) {
         up[2] = found(2, f0.cell, f1.cell, f2.cell, f3.cell);
         slots[2] = atomicAdd(counts[2], count(up[2]));
         below[lane] = up[2].cell;
     }
     // Above, the first lanes of the group go on: 16, 4, 1, each with four neighbours of the level below.
-    if (TOP >= 3) {
+    if (TOP / 3 != 0) {
         barrier();
         int k = (lane & 3) * 2 + (lane >> 2 & 3) * 16;
         up[3] = found(3, below[k], below[k + 1], below[k + 8], below[k + 9]);
@@ -122,7 +122,7 @@ void main() {
             below[64 + lane] = up[3].cell;
         }
     }
-    if (TOP >= 4) {
+    if (TOP / 4 != 0) {
         barrier();
         int k = 64 + (lane & 1) * 2 + (lane >> 1 & 1) * 8;
         up[4] = found(4, below[k], below[k + 1], below[k + 4], below[k + 5]);
@@ -131,7 +131,7 @@ void main() {
             below[80 + lane] = up[4].cell;
         }
     }
-    if (TOP >= 5) {
+    if (TOP / 5 != 0) {
         barrier();
         up[5] = found(5, below[80], below[81], below[82], below[83]);
         if (lane == 0) {
@@ -158,16 +158,16 @@ void main() {
     write(1, c1 + ivec2(1, 0), f1, true, slots[1]);
     write(1, c1 + ivec2(0, 1), f2, true, slots[1]);
     write(1, c1 + 1, f3, true, slots[1]);
-    if (TOP >= 2) {
+    if (TOP / 2 != 0) {
         write(2, c2, up[2], true, slots[2]);
     }
-    if (TOP >= 3) {
+    if (TOP / 3 != 0) {
         write(3, group * 4 + ivec2(lane & 3, lane >> 2), up[3], lane < 16, slots[3]);
     }
-    if (TOP >= 4) {
+    if (TOP / 4 != 0) {
         write(4, group * 2 + ivec2(lane & 1, lane >> 1), up[4], lane < 4, slots[4]);
     }
-    if (TOP >= 5) {
+    if (TOP / 5 != 0) {
         write(5, group, up[5], lane == 0, slots[5]);
     }
 }

@@ -165,15 +165,11 @@ vec3 lookup(Local f, Material m, uint u) {
 
 // Stores the radiance at sample p, which stands for a cell of level l.
 void store(ivec2 p, int l, vec3 value) {
-    if (!LEVELLED) {
-        imageStore(radiance, p, vec4(value, 1.0));
-        return;
-    }
-    ivec2 cell = (p >> l) + ivec2(0, frame.levels[l].w);
-    if ((l & 1) == 0) {
-        imageStore(radiance, cell, vec4(value, 1.0));
-    } else {
+    ivec2 cell = LEVELLED ? (p >> l) + ivec2(0, frame.levels[l].w) : p;
+    if (LEVELLED && (l & 1) != 0) {
         imageStore(odd, cell, vec4(value, 1.0));
+    } else {
+        imageStore(radiance, cell, vec4(value, 1.0));
     }
 }
 

@@ -20,7 +20,8 @@ pub enum Estimator {
 }
 
 /// Where samples are shaded. Levels are of output pixels: 0 is a pixel, +1 is 2x2 coarser; the samples of a pixel are at
-/// negative ones. Every sample that is not shaded is up-sampled from coarser cells.
+/// negative ones. Every sample that is not shaded is up-sampled from coarser cells. A host with its own bridge replaces the
+/// modules `pyramid.comp` and `classify.levels.comp` too, unless the rate is full.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Rate {
     /// Every sample.

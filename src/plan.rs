@@ -230,6 +230,27 @@ mod tests {
     }
 
     #[test]
+    fn levels_halve_and_find_their_places() {
+        let config = Config { rate: Rate::Given, ..Config::new([13, 7]) };
+        let plan = Plan::of(&config);
+        assert_eq!(plan.levels.extents, [[13, 7], [7, 4], [4, 2], [2, 1]]);
+        let uniform = plan.levels.uniform();
+        assert_eq!(uniform[..4], [[13, 7, 0, 0], [7, 4, 0, 0], [4, 2, 28, 7], [2, 1, 36, 4]]);
+        assert_eq!((plan.radiance.extent, plan.odd.map(|i| i.extent)), ([13, 9, 1], Some([7, 5, 1])));
+        assert_eq!(plan.level, None, "the host's");
+        let cells = 28 + 8 + 2;
+        assert_eq!(plan.cell_buffers().map(|b| b.1), [8 * cells, 8 * cells, 16 * cells, 96]);
+        // Coarser than any device's tile never; nothing at all at the full rate.
+        for (rate, lmax, side, top) in [(Rate::Given, 5, 4, 5), (Rate::Uniform(u32::MAX), 0, 2, 5), (Rate::Uniform(0), 3, 4, 2)] {
+            let config = Config { rate, lmax, samples_per_side: side, ..config.clone() };
+            assert_eq!(Plan::of(&config).levels.top, top);
+        }
+        let full = Plan::of(&Config::new([13, 7]));
+        assert_eq!((full.radiance.extent, full.odd, full.level, full.levels.cells()), ([13, 7, 1], None, None, 0));
+        assert_eq!(full.largest_buffer(), full.list_bytes());
+    }
+
+    #[test]
     fn directions_are_shared_out() {
         for n in [2, 3, 64, 65] {
             let config = Config { directions: n, ..Config::new([1, 1]) };

@@ -3,6 +3,7 @@
 use passband::offline::image_io::{LinearImage, PngSamples, read_exr, read_hdr, read_png};
 use passband::sampling::luminance;
 use serde_json::Value;
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -79,7 +80,7 @@ fn every_documented_flag_works_or_is_not_supported_yet() {
     let folder = Folder::new("flags");
     let filters = "point naive fixed toksvig toksvig-lobe lean lean-lobe leadr tk fournier4 fournier7 gmm gmm-unaligned vmf1 vmf4 \
                    vmf8 vmf clusters bruteforce supersample";
-    let layers = "level samples bandwidth spread shaded lobes mip depth normal material curvature uv";
+    let layers = "level weight samples bandwidth spread shaded lobes mip depth normal material curvature uv";
     let choices = [
         ("--rate", "full half quarter luminance bandwidth oracle"),
         ("--estimator", "mis brdf brdf-random preconvolved cv residual"),
@@ -113,7 +114,17 @@ fn every_documented_flag_works_or_is_not_supported_yet() {
     }
     println!("worked: {worked:?}\nlater: {later:?}");
     // What the main job promises.
-    for flag in ["--rate full", "--estimator mis", "--estimator brdf-random", "--aa 16", "--filter point", "--aov curvature"] {
+    for flag in [
+        "--rate full",
+        "--rate half",
+        "--rate quarter",
+        "--aov level",
+        "--estimator mis",
+        "--estimator brdf-random",
+        "--aa 16",
+        "--filter point",
+        "--aov curvature",
+    ] {
         assert!(worked.iter().any(|w| w == flag), "{flag}");
     }
     assert_eq!(folder.files(), ["stats.json"]);
@@ -196,7 +207,7 @@ fn statistics_hold_every_field() {
     // The finest samples: the image's coverage is their mean over each pixel.
     let coverage: f64 = folder.exr("out.exr").channel("A").unwrap().iter().map(|a| f64::from(*a)).sum();
     assert_eq!(number(&report, "/pixels/covered"), (4.0 * coverage).round());
-    assert_eq!(number(&report, "/pixels/shaded"), number(&report, "/pixels/by_level/0"));
+    assert_eq!(number(&report, "/pixels/shaded"), number(&report, "/pixels/by_level/-1"), "a quarter of a pixel each");
     assert_eq!(number(&report, "/samples/taken"), 6.0 * number(&report, "/pixels/shaded"));
     assert!(number(&report, "/samples/budget") >= number(&report, "/samples/taken"));
 
@@ -217,6 +228,30 @@ fn statistics_hold_every_field() {
     }
     // At least the RGBA32F radiance of 80x48 samples.
     assert!(number(&report, "/memory_bytes") > 80.0 * 48.0 * 16.0);
+}
+
+#[test]
+fn coarse_rates_count_by_output_level() {
+    let folder = Folder::new("coarse");
+    let args = ["--size", "64x48", "--samples", "2", "--aa", "4", "--rate", "half", "--aov", "level,weight,shaded", "--validate"];
+    folder.render("trio", &[&args[..], &["--stats", "stats.json", "-o", "out.exr"]].concat()).quiet();
+    let report = folder.json("stats.json");
+    assert_eq!(report["settings"]["rate"], "half");
+    let counts: BTreeMap<i32, u64> = serde_json::from_value(report["pixels"]["by_level"].clone()).unwrap();
+    assert!(counts.keys().all(|level| (-1..=1).contains(level)) && counts[&1] > 100, "{counts:?}");
+    assert_eq!(number(&report, "/pixels/shaded"), counts.values().sum::<u64>() as f64);
+    assert!(number(&report, "/pixels/shaded") < 0.25 * number(&report, "/pixels/covered"));
+    assert_eq!(number(&report, "/samples/taken"), 2.0 * number(&report, "/pixels/shaded"));
+    let names: Vec<_> = report["passes"].as_array().unwrap().iter().map(|pass| pass["name"].as_str().unwrap()).collect();
+    assert_eq!(names, ["gbuffer", "level", "pyramid", "classify", "shade", "upsample", "resolve"]);
+    let image = folder.exr("out.exr");
+    let layer = |name: &str| image.channel(name).unwrap();
+    for (i, alpha) in layer("A").iter().enumerate().filter(|(_, alpha)| **alpha == 1.0) {
+        assert_eq!(layer("level.Y")[i], 1.0, "{i}: {alpha}");
+        assert!((0.0..=1.0).contains(&layer("weight.Y")[i]) && [0.0, 1.0].contains(&layer("shaded.Y")[i]));
+    }
+    assert!(layer("weight.Y").contains(&1.0) && layer("shaded.Y").contains(&1.0));
+    folder.render("trio", &["--rate", "oracle", "-o", "x.exr"]).refused(2, &["not supported yet", "--rate"]);
 }
 
 #[test]

@@ -115,6 +115,7 @@ fn host_images_are_left_as_their_exit_says() {
             gbuffer: GBufferInput::Host { set: targets.set, images: &images },
             environment: EnvironmentUse::default(),
             lights: &[],
+            levels: None,
             seed: [0, 0],
             levels: None,
             output: Some(Output { image: output, transfer: Transfer::Linear }),

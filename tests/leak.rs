@@ -8,11 +8,11 @@ use common::rig::{Rig, grey, sky};
 use passband::offline::builtin;
 use passband::reflectance::Model;
 use passband::reflectance::stand_in;
-use passband::{Config, Error, Renderer, memory_footprint};
+use passband::{Config, Error, Rate, Renderer, memory_footprint};
 use std::sync::Arc;
 
 fn config() -> Config {
-    Config { curvature: true, directions: 4, ..Config::new([24, 16]) }
+    Config { curvature: true, rate: Rate::Uniform(2), directions: 4, ..Config::new([24, 16]) }
 }
 
 /// Runs `call` with request 0, 1, … failing until it succeeds; the number of requests that it makes.

@@ -69,6 +69,8 @@ impl Requirements {
                 ("maxStorageBufferRange", plan.largest_buffer()),
                 ("maxPushConstantsSize", 128),
                 ("maxBoundDescriptorSets", 3),
+                // `classify` of levels has six; `shade` has four, with the materials'.
+                ("maxPerStageDescriptorStorageBuffers", if plan.levels.top > 0 { 6 } else { 4 }),
                 ("maxColorAttachments", 4),
                 ("maxComputeWorkGroupInvocations", 64),
             ],
@@ -159,6 +161,7 @@ fn limit(limits: &vk::PhysicalDeviceLimits, name: &str) -> u64 {
         "maxStorageBufferRange" => limits.max_storage_buffer_range.into(),
         "maxPushConstantsSize" => limits.max_push_constants_size.into(),
         "maxBoundDescriptorSets" => limits.max_bound_descriptor_sets.into(),
+        "maxPerStageDescriptorStorageBuffers" => limits.max_per_stage_descriptor_storage_buffers.into(),
         "maxColorAttachments" => limits.max_color_attachments.into(),
         "maxComputeWorkGroupInvocations" => limits.max_compute_work_group_invocations.into(),
         _ => 0,

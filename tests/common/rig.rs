@@ -224,6 +224,7 @@ impl Target {
             gbuffer: GBufferInput::Draws(draws),
             environment: EnvironmentUse::default(),
             lights: &[],
+            levels: None,
             seed: [7, 0],
             levels: None,
             output: Some(Output { image: self.image, transfer: Transfer::Linear }),
