@@ -127,17 +127,19 @@ impl LocalFrequency {
             low = level.low;
         }
         let (width, height) = ((image.width / 2).max(1), (image.height() / 2).max(1));
-        let mut axes = [(); 2].map(|()| Grid::from_fn(width, height, |_, _| 0.0));
-        for i in 0..width * height {
-            let (x, y) = (i % width, i / width);
-            let at = |axis: usize| -> Vec<f64> {
-                let levels = covering.iter().enumerate();
-                levels.map(|(h, grids)| grids[axis].values[(y >> h) * grids[axis].width + (x >> h)]).collect()
-            };
-            let details = [at(0), at(1)];
-            let largest = details.iter().flatten().fold(floor, |a, &b| a.max(b));
+        let mut axes = [(); 2].map(|()| Grid { width, values: Vec::with_capacity(width * height) });
+        let mut details = [vec![0.0; covering.len()], vec![0.0; covering.len()]];
+        for (x, y) in (0..width * height).map(|i| (i % width, i / width)) {
+            let mut largest = floor;
+            for (h, grids) in covering.iter().enumerate() {
+                for (axis, grid) in grids.iter().enumerate() {
+                    let detail = grid.values[(y >> h) * grid.width + (x >> h)];
+                    details[axis][h] = detail;
+                    largest = largest.max(detail);
+                }
+            }
             for (grid, details) in axes.iter_mut().zip(&details) {
-                grid.values[i] = crossing(details, eps * largest) / bias(eps);
+                grid.values.push(crossing(details, eps * largest) / bias(eps));
             }
         }
         Self { axes }
@@ -145,10 +147,14 @@ impl LocalFrequency {
 }
 
 /// The largest of the coefficients that cover each block: its own and those of the `blocks - 1` blocks before it, both ways.
-fn spread(details: &Grid, blocks: i64) -> Grid {
+fn spread(details: &Grid, blocks: usize) -> Grid {
     let across = |g: &Grid| {
-        let largest = |x: usize, y: usize| (0..blocks).map(|k| g.wrapped(x as i64 - k, y as i64)).fold(0.0, f64::max);
-        Grid::from_fn(g.width, g.height(), largest)
+        let mut values = Vec::with_capacity(g.values.len());
+        for row in g.values.chunks_exact(g.width) {
+            let before = |x: usize, k: usize| row[(x + g.width * blocks - k) % g.width];
+            values.extend((0..g.width).map(|x| (0..blocks).map(|k| before(x, k)).fold(0.0, f64::max)));
+        }
+        Grid { width: g.width, values }
     };
     across(&across(details).transposed()).transposed()
 }
