@@ -9,6 +9,7 @@ pub mod gltf;
 pub mod headless;
 pub mod image_io;
 mod input;
+pub mod lobe_cache;
 pub mod mesh;
 pub mod metrics;
 pub mod reference;

@@ -3,10 +3,11 @@
 use comfy_table::{Table, presets};
 use glam::DVec3;
 use passband::offline::error::{Error, Result};
+use passband::offline::lobe_cache::{self, lobe_bandwidth};
 use passband::offline::scene::{read_merl, read_rgl, read_sgd};
 use passband::reflectance::analysis::{HIGHLIGHT, albedo, highlight, reciprocity_error};
 use passband::reflectance::bake::{self, BakeError};
-use passband::reflectance::{LobeBandwidth, MerlTable, Model, Reflectance, stand_in};
+use passband::reflectance::{MerlTable, Model, Reflectance, stand_in};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -122,7 +123,7 @@ fn report(subject: &Subject) {
     let error = format!("rms {:.2e}, median {:.2e}, 99 % {:.2e}", bake.rms, bake.median, bake.p99);
     table.add_row(["table on the GPU, relative error".into(), error]);
     println!("{table}\n\nangular bandwidth of the lobe around the mirror direction, over the view angle:");
-    let bandwidth = LobeBandwidth::build(&subject.shaded);
+    let bandwidth = lobe_bandwidth(&subject.shaded, lobe_cache::cache_folder().as_deref());
     let mut table = Table::new();
     table.load_style(presets::NOTHING).set_header(["degrees", "cycles/radian"]);
     for degrees in ANGLES {
