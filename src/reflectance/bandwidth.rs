@@ -149,7 +149,7 @@ fn analyse(model: &Model, theta: f64, turn: f64, tile: &mut [f32]) {
         .collect();
     let mean = values.iter().sum::<f64>() / values.len() as f64;
     let slice = Grid { width: SLICE, values };
-    let [across, down] = LocalFrequency::of(&slice, usize::MAX, EPS, FLOOR * mean).axes;
+    let [across, down] = LocalFrequency::of(&slice, EPS, FLOOR * mean).axes;
     // Blocks of two samples a side of a texel.
     let blocks = SLICE / 2 / SIDE;
     for (i, texel) in tile.iter_mut().enumerate() {
