@@ -132,7 +132,6 @@ pub fn run(options: &Options) -> Result<Report, Box<dyn Error>> {
                 lights: &[],
                 levels: None,
                 seed: [0, 0],
-                levels: None,
                 output: Some(Output { image: output, transfer: Transfer::Srgb { exposure: 0.5 } }),
             };
             renderer.record(cmd, &inputs)?;

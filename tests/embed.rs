@@ -117,7 +117,6 @@ fn host_images_are_left_as_their_exit_says() {
             lights: &[],
             levels: None,
             seed: [0, 0],
-            levels: None,
             output: Some(Output { image: output, transfer: Transfer::Linear }),
         };
         // SAFETY: as above; each buffer holds its whole image.

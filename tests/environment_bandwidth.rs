@@ -1,4 +1,4 @@
-//! The environment's bandwidth on the device against its f64 twin.
+//! The environment's bandwidth on the device against its f64 twin, and the commands that show bandwidths.
 
 use glam::DVec3;
 use passband::frequency::AngularBandwidth;
@@ -58,7 +58,7 @@ fn the_device_agrees_with_its_twin() {
     compare("cosine-200", &builtin::environment("cosine-200", 512).unwrap(), 3e-3);
     compare("sun-sky", &builtin::environment("sun-sky", 1024).unwrap(), 3e-3);
     compare("studio", &builtin::environment("studio", 512).unwrap(), 3e-3);
-    for size in [[64, 32], [128, 128], [32, 64], [100, 50], [33, 17], [2, 1], [3, 3], [1, 1]] {
+    for size in [[64, 32], [128, 128], [32, 64], [100, 50], [33, 17], [2, 1], [3, 3], [1, 1], [4100, 6], [3, 1500]] {
         compare(&format!("noise {size:?}"), &noise(size[0], size[1]), 3e-3);
     }
 }
@@ -69,4 +69,43 @@ fn flat_and_dark_light_have_none() {
         let (got, _) = on_device(&LatLong::new(64, 32, vec![[radiance; 3]; 64 * 32]).unwrap());
         assert!(got.iter().all(|&b| b == 0.0), "{radiance}");
     }
+}
+
+/// Runs the command and returns its exit code and what it printed.
+fn passband(args: &[&str]) -> (Option<i32>, String) {
+    let cache = std::path::Path::new(env!("CARGO_TARGET_TMPDIR")).join("bandwidth-cache");
+    let out =
+        std::process::Command::new(env!("CARGO_BIN_EXE_passband")).args(args).env("XDG_CACHE_HOME", cache).output().unwrap();
+    (out.status.code(), String::from_utf8_lossy(&[out.stdout, out.stderr].concat()).into_owned())
+}
+
+#[test]
+fn the_command_reports_and_plots_an_environment() {
+    let plot = format!("{}/bandwidth.png", env!("CARGO_TARGET_TMPDIR"));
+    let (code, text) = passband(&["environment", "cosine-64", "-o", &plot]);
+    assert_eq!(code, Some(0), "{text}");
+    let median = text.split("median ").nth(1).and_then(|t| t.split(',').next()).unwrap().parse::<f64>().unwrap();
+    assert!((median * std::f64::consts::TAU / 64.0 - 1.0).abs() < 0.25, "{text}");
+    assert_eq!(image::image_dimensions(&plot).unwrap(), (2048, 512));
+    let (code, text) = passband(&["environment", "nothing.exr"]);
+    assert!(code == Some(2) && text.contains("nothing.exr"), "{text}");
+    let (code, text) = passband(&["environment", "studio", "--eps", "2"]);
+    assert!(code == Some(2) && text.contains("--eps"), "{text}");
+    let (code, text) = passband(&["environment", "studio", "-o", "plot.jpg"]);
+    assert!(code == Some(2) && text.contains(".png"), "{text}");
+}
+
+#[test]
+fn the_command_reports_a_materials_bandwidth() {
+    let at = |name: &str| -> f64 {
+        let (code, text) = passband(&["material", name]);
+        assert_eq!(code, Some(0), "{text}");
+        let table = text.split("cycles/radian").nth(1).unwrap();
+        let row = table.lines().map(|l| l.split_whitespace().collect::<Vec<_>>()).find(|l| l.first() == Some(&"30"));
+        row.unwrap()[1].parse().unwrap()
+    };
+    let values = ["mirror-metal", "metallic-paint", "rough"].map(at);
+    assert!(values[0] > 3.0 * values[1] && values[1] > 2.0 * values[2], "{values:?}");
+    // From the cache.
+    assert_eq!(values[0], at("mirror-metal"));
 }

@@ -56,7 +56,7 @@ impl AngularBandwidth {
             let (x, y) = if y < height { (x, y) } else { ((x + width / 2) % width, 2 * height - 1 - y) };
             resampled.values[y * width + x]
         });
-        let [across, down] = LocalFrequency::of(&torus, usize::MAX, eps, FLOOR).axes;
+        let [across, down] = LocalFrequency::of(&torus, eps, FLOOR).axes;
         Self {
             map: Grid::from_fn(width / 2, height / 2, |x, y| {
                 let i = y * (width / 2) + x;

@@ -24,7 +24,7 @@ impl TextureBandwidth {
             row(y) * (1.0 - fy) + row(y + 1) * fy
         });
         let mean = resampled.values.iter().sum::<f64>() / resampled.values.len() as f64;
-        let [mut u, mut v] = LocalFrequency::of(&resampled, usize::MAX, eps, super::environment::FLOOR * mean.abs()).axes;
+        let [mut u, mut v] = LocalFrequency::of(&resampled, eps, super::environment::FLOOR * mean.abs()).axes;
         u.values.iter_mut().for_each(|f| *f *= width as f64);
         v.values.iter_mut().for_each(|f| *f *= height as f64);
         Self { axes: [u, v] }

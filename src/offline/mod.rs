@@ -10,6 +10,7 @@ pub mod headless;
 pub mod image_io;
 mod input;
 pub mod levels;
+pub mod lobe_cache;
 pub mod mesh;
 pub mod metrics;
 pub mod reference;

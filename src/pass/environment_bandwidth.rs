@@ -143,7 +143,7 @@ impl EnvironmentBandwidth {
     pub fn record(&self, rec: &mut Recorder<'_>, io: &Io<'_>, work: Work, bag: &mut Retired) -> Image {
         let [width, height] = work.luminance.extent();
         // Of the torus.
-        let size = |h: u32| [(width >> h) as i32, (2 * height >> h) as i32];
+        let size = |h: u32| [(width >> h) as i32, ((2 * height) >> h) as i32];
         let place = |h: u32| if h == 1 { [0, 0] } else { [(width / 2) as i32, height as i32 - size(h - 1)[1]] };
         let levels = width.min(2 * height).ilog2();
         let unsigned = |[x, y]: [i32; 2]| [x as u32, y as u32];

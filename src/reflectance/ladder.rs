@@ -41,7 +41,7 @@ impl Ladder {
             let square = if i == 0 { first } else { first + i as f64 / steps_per_log2 }.exp2();
             match mapped {
                 Some(_) => material.mean(Some(parameter(&material.model, square)), 0.0),
-                None => material.mean(None, (square - own).max(0.0)),
+                None => material.mean(None, if i == 0 { 0.0 } else { square - own }),
             }
         };
         Self { points: (0..steps).map(point).collect(), first, steps_per_log2 }

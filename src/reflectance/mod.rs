@@ -8,6 +8,7 @@ use std::sync::Arc;
 
 pub mod analysis;
 pub mod bake;
+pub mod bandwidth;
 pub mod blinn_phong;
 mod cavity;
 pub mod frame;
@@ -24,6 +25,7 @@ pub mod stand_in;
 pub mod turned;
 pub mod vmf;
 
+pub use bandwidth::LobeBandwidth;
 pub use blinn_phong::BlinnPhong;
 pub use ggx::Ggx;
 pub use importance::ImportanceTable;

@@ -226,7 +226,6 @@ impl Target {
             lights: &[],
             levels: None,
             seed: [7, 0],
-            levels: None,
             output: Some(Output { image: self.image, transfer: Transfer::Linear }),
         }
     }

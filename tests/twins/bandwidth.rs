@@ -1,8 +1,10 @@
-//! `bandwidth.glsl` against `frequency::operators` and `frequency::level`.
+//! `bandwidth.glsl` against `frequency::operators` and `frequency::level`, `lobe_bandwidth.glsl` against `reflectance::bandwidth`.
 
-use crate::{COUNT, Device, Worst, unit};
+use crate::{COUNT, Device, Worst, direction, entry, unit};
+use glam::Vec3;
 use passband::frequency::level::level;
 use passband::frequency::operators::{Operator, Surface, pixel_angle, texture};
+use passband::reflectance::bandwidth::{SIDE, WIDTH, texel};
 
 const OPERATORS: [Operator; 3] = [Operator::Box, Operator::Clipped, Operator::Covariance];
 
@@ -57,4 +59,33 @@ fn operators_pixel_angles_and_levels() {
         spatial.within("texture's image bandwidth, relative", 1e-6);
         angle.within("pixel angle, relative", 1e-6);
     }
+}
+
+#[test]
+fn lobes_texels() {
+    let up = |i, seed| {
+        let w = direction(i, seed);
+        Vec3::new(w.x, w.y, w.z.abs())
+    };
+    let mut pairs: Vec<[Vec3; 2]> = (0..COUNT).map(|i| [up(i, 44), up(i, 45)]).collect();
+    let edges = [Vec3::Z, Vec3::X, Vec3::NEG_X, Vec3::Y, Vec3::new(0.6, 0.0, 0.8), Vec3::new(0.0, -0.8, 0.6)];
+    pairs.extend(edges.iter().flat_map(|&a| edges.map(|b| [a, b])));
+    let entries = pairs.iter().flat_map(|&[wi, wo]| [entry(wi, 3), entry(wo, 0)]).collect::<Vec<_>>();
+    let output = Device::bare().probe("lobe_bandwidth", &entries);
+    let mut used = vec![false; WIDTH * SIDE];
+    let mut apart = 0;
+    for (&[wi, wo], got) in pairs.iter().zip(output.chunks_exact(2)) {
+        let [column, row] = [got[0][0] as usize, got[0][1] as usize - 3 * SIDE];
+        used[row * WIDTH + column] = true;
+        let expected = texel(wi.as_dvec3(), wo.as_dvec3());
+        // Texels change where a coordinate is whole: there either of two neighbours, or of two angles, is right.
+        let near = |a: usize, b: usize| a.abs_diff(b) <= 1;
+        let [angle, x] = [column / SIDE, column % SIDE];
+        assert!(near(angle, expected[0] / SIDE) && near(x, expected[0] % SIDE) && near(row, expected[1]), "{wi} {wo}");
+        apart += usize::from([column, row] != expected);
+    }
+    assert!(apart < pairs.len() / 500, "{apart} of {}", pairs.len());
+    // Tiles are discs.
+    let share = used.iter().filter(|u| **u).count() as f64 / used.len() as f64;
+    assert!((0.75..0.95).contains(&share), "{share}");
 }

@@ -1,6 +1,7 @@
 //! The `passband` command: one file a subcommand.
 
 mod compare;
+mod environment;
 mod info;
 mod material;
 mod render;
@@ -25,6 +26,7 @@ struct Cli {
 enum Command {
     Render(Box<render::Args>),
     Compare(compare::Args),
+    Environment(environment::Args),
     Info(info::Args),
     Material(material::Args),
     Scenes(scenes::Args),
@@ -38,6 +40,7 @@ fn main() -> ExitCode {
     let result = match &cli.command {
         Command::Render(args) => render::run(args),
         Command::Compare(args) => compare::run(args),
+        Command::Environment(args) => environment::run(args),
         Command::Info(args) => info::run(args),
         Command::Material(args) => material::run(args),
         Command::Scenes(args) => scenes::run(args),

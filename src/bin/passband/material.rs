@@ -1,11 +1,13 @@
 //! `passband material`: what a reflectance does, in numbers and as a plot.
 
 use comfy_table::{Table, presets};
+use glam::DVec3;
 use passband::offline::error::{Error, Result};
+use passband::offline::lobe_cache::{self, lobe_bandwidth};
 use passband::offline::scene::{read_merl, read_rgl, read_sgd};
 use passband::reflectance::analysis::{HIGHLIGHT, albedo, highlight, reciprocity_error};
 use passband::reflectance::bake::{self, BakeError};
-use passband::reflectance::{MerlTable, Reflectance, stand_in};
+use passband::reflectance::{MerlTable, Model, Reflectance, stand_in};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -16,8 +18,10 @@ mod plot;
 const ANGLES: [f64; 7] = [0.0, 15.0, 30.0, 45.0, 60.0, 75.0, 85.0];
 /// Pairs at which what is baked is compared with what it was baked of.
 const PAIRS: u32 = 50_000;
+/// Numbers of principal components whose error is reported.
+const COMPONENTS: [usize; 4] = [0, 1, 2, 4];
 
-/// Reports a reflectance's energy, reciprocity and highlight, and plots its lobes and slices
+/// Reports a reflectance's energy, reciprocity, highlight and bandwidth, and plots its lobes and slices
 #[derive(clap::Args)]
 pub struct Args {
     /// A MERL table (.binary), an RGL file (.bsdf), a row of an SGD table (TABLE.csv:NAME) or a built-in's name
@@ -33,6 +37,7 @@ struct Subject {
     title: String,
     reflectance: Box<dyn Reflectance>,
     /// What the GPU shades instead, and how far that is off.
+    shaded: Model,
     baked: BakeError,
 }
 
@@ -59,8 +64,9 @@ fn load(material: &str) -> Result<Subject> {
     // The last colon, as a path may hold one too.
     if let Some((table, name)) = material.rsplit_once(':').filter(|(table, _)| table.to_lowercase().ends_with(".csv")) {
         let sgd = read_sgd(Path::new(table), name)?;
-        let baked = bake::error(&sgd, &packed(&sgd.bake()), PAIRS);
-        return Ok(Subject { title: format!("{name} (SGD)"), reflectance: Box::new(sgd), baked });
+        let shaded = packed(&sgd.bake());
+        let baked = bake::error(&sgd, &shaded, PAIRS);
+        return Ok(Subject { title: format!("{name} (SGD)"), reflectance: Box::new(sgd), shaded, baked });
     }
     let path = Path::new(material);
     let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
@@ -69,12 +75,13 @@ fn load(material: &str) -> Result<Subject> {
         "binary" => Ok(measured(format!("{stem} (MERL)"), read_merl(path)?)),
         "bsdf" => {
             let rgl = read_rgl(path)?;
-            let (kind, baked) = if rgl.isotropic() {
-                ("isotropic", bake::error(&rgl, &packed(&rgl.bake()), PAIRS))
+            let (kind, shaded) = if rgl.isotropic() {
+                ("isotropic", packed(&rgl.bake()))
             } else {
-                ("anisotropic", bake::error(&rgl, &rgl.bake_turned()?, PAIRS))
+                ("anisotropic", Model::Turned(rgl.bake_turned()?.into()))
             };
-            Ok(Subject { title: format!("{stem} (RGL, {kind})"), reflectance: Box::new(rgl), baked })
+            let baked = bake::error(&rgl, &shaded, PAIRS);
+            Ok(Subject { title: format!("{stem} (RGL, {kind})"), reflectance: Box::new(rgl), shaded, baked })
         }
         _ => {
             let expected = format!("FILE.binary, FILE.bsdf, TABLE.csv:NAME or one of {}", stand_in::names().join(", "));
@@ -84,14 +91,15 @@ fn load(material: &str) -> Result<Subject> {
 }
 
 fn measured(title: String, table: MerlTable) -> Subject {
-    let baked = bake::error(&table, &packed(&table), PAIRS);
-    Subject { title, reflectance: Box::new(table), baked }
+    let shaded = packed(&table);
+    let baked = bake::error(&table, &shaded, PAIRS);
+    Subject { title, reflectance: Box::new(table), shaded, baked }
 }
 
 /// The table as the GPU holds it.
-fn packed(table: &MerlTable) -> MerlTable {
+fn packed(table: &MerlTable) -> Model {
     let (scale, entries) = table.packed();
-    MerlTable::unpacked(scale, &entries)
+    Model::Table(MerlTable::unpacked(scale, &entries).into())
 }
 
 fn report(subject: &Subject) -> Result<()> {
@@ -114,5 +122,17 @@ fn report(subject: &Subject) -> Result<()> {
     table.add_row(["half-width at half maximum".into(), width]);
     let error = format!("rms {:.2e}, median {:.2e}, 99 % {:.2e}", bake.rms, bake.median, bake.p99);
     table.add_row(["table on the GPU, relative error".into(), error]);
-    crate::print(table)
+    crate::print(table)?;
+    crate::print(format_args!("\nangular bandwidth of the lobe around the mirror direction, over the view angle:"))?;
+    let bandwidth = lobe_bandwidth(&subject.shaded, lobe_cache::cache_folder().as_deref());
+    let mut table = Table::new();
+    table.load_style(presets::NOTHING).set_header(["degrees", "cycles/radian"]);
+    for degrees in ANGLES {
+        let (sine, cosine) = degrees.to_radians().sin_cos();
+        let at = bandwidth.at(DVec3::new(-sine, 0.0, cosine), DVec3::new(sine, 0.0, cosine));
+        table.add_row([format!("{degrees}"), format!("{at:.2}")]);
+    }
+    crate::print(table)?;
+    let errors = COMPONENTS.map(|k| format!("{k}: {:.3}", bandwidth.compressed(k).1)).join(", ");
+    crate::print(format_args!("\nits relative error from the mean and so many principal components: {errors}"))
 }

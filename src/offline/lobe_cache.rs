@@ -1,0 +1,128 @@
+//! Lobe bandwidths kept on disk by the content of the model.
+//!
+//! A cache entry is the SHA-256 of what follows, and the texels as little-endian 32-bit floats.
+
+use crate::offline::image_io::write_atomically;
+use crate::reflectance::{LobeBandwidth, MerlTable, Model};
+use sha2::{Digest, Sha256};
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+/// Changes with whatever changes the result for one model.
+const VERSION: &[u8] = b"passband lobe bandwidth 1";
+
+/// The folder of the user's cache in which lobe bandwidths are kept; `None` on systems that have none.
+pub fn cache_folder() -> Option<PathBuf> {
+    dirs::cache_dir().map(|folder| folder.join("passband").join("lobes"))
+}
+
+/// The lobe bandwidth of `model`, from `cache` if it is there; otherwise it is built and kept there, if that is possible.
+pub fn lobe_bandwidth(model: &Model, cache: Option<&Path>) -> LobeBandwidth {
+    let entry = cache.map(|folder| folder.join(format!("{}.lobes", key(model))));
+    if let Some(known) = entry.as_ref().and_then(|entry| from_bytes(&std::fs::read(entry).ok()?)) {
+        return known;
+    }
+    let built = LobeBandwidth::build(model);
+    if let Some(entry) = &entry {
+        keep(entry, &built);
+    }
+    built
+}
+
+/// The name of a model's content.
+fn key(model: &Model) -> String {
+    let mut hash = Sha256::new();
+    hash.update(VERSION);
+    let mut table = |table: &MerlTable| {
+        // What the device shades.
+        let (scale, entries) = table.packed();
+        hash.update(scale.to_le_bytes());
+        hash.update(bytemuck::cast_slice(&entries));
+    };
+    match model {
+        Model::Table(one) => table(one),
+        Model::Turned(turned) => turned.nodes().iter().for_each(|node| table(node)),
+        _ => {}
+    }
+    // Shortest decimals that read back as the same numbers, and the model's name.
+    match model {
+        Model::Table(_) => hash.update("table"),
+        Model::Turned(turned) => hash.update(format!("turned {} {}", turned.symmetry(), turned.nodes().len())),
+        Model::Ggx(ggx) => hash.update(format!("{ggx:?}")),
+        Model::BlinnPhong(blinn_phong) => hash.update(format!("{blinn_phong:?}")),
+        Model::Vmf(vmf) => hash.update(format!("{vmf:?}")),
+    }
+    format!("{:x}", hash.finalize())
+}
+
+fn keep(entry: &Path, bandwidth: &LobeBandwidth) {
+    let Some(folder) = entry.parent() else { return };
+    let written = std::fs::create_dir_all(folder).map_err(|e| e.to_string());
+    let written = written.and_then(|()| {
+        let bytes = to_bytes(bandwidth);
+        write_atomically(entry, |file| file.write_all(&bytes)).map_err(|e| e.to_string())
+    });
+    if let Err(e) = written {
+        log::warn!("the lobe bandwidth is not kept: {e}");
+    }
+}
+
+fn to_bytes(bandwidth: &LobeBandwidth) -> Vec<u8> {
+    let content: Vec<u8> = bandwidth.texels().iter().flat_map(|b| b.to_le_bytes()).collect();
+    let mut bytes = Sha256::digest(&content).to_vec();
+    bytes.extend(content);
+    bytes
+}
+
+/// Nothing unless the entry is whole.
+fn from_bytes(bytes: &[u8]) -> Option<LobeBandwidth> {
+    let (sum, content) = bytes.split_at_checked(32)?;
+    if Sha256::digest(content).as_slice() != sum {
+        return None;
+    }
+    LobeBandwidth::from_texels(content.as_chunks::<4>().0.iter().map(|b| f32::from_le_bytes(*b)).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::reflectance::{Ggx, stand_in};
+    use glam::DVec3;
+    use std::sync::Arc;
+
+    fn ggx(alpha: f64) -> Model {
+        Model::Ggx(Ggx { alpha, f0: DVec3::ONE, albedo: DVec3::ZERO })
+    }
+
+    #[test]
+    fn entries_are_used_and_damaged_ones_replaced() {
+        let folder = tempfile::tempdir().unwrap();
+        let cache = folder.path().join("deep").join("cache");
+        let fresh = lobe_bandwidth(&ggx(0.3), Some(&cache));
+        let entry = cache.join(format!("{}.lobes", key(&ggx(0.3))));
+        let kept = std::fs::read(&entry).unwrap();
+        // A valid entry of other content is believed: it is read, not computed.
+        let other = LobeBandwidth::from_texels(vec![1.0; fresh.texels().len()]).unwrap();
+        std::fs::write(&entry, to_bytes(&other)).unwrap();
+        assert_eq!(lobe_bandwidth(&ggx(0.3), Some(&cache)), other);
+        let mut flipped = kept.clone();
+        flipped[100] ^= 1;
+        for damaged in [vec![], kept[..kept.len() / 2].to_vec(), flipped] {
+            std::fs::write(&entry, damaged).unwrap();
+            assert_eq!(lobe_bandwidth(&ggx(0.3), Some(&cache)), fresh);
+            assert_eq!(std::fs::read(&entry).unwrap(), kept, "rewritten");
+        }
+        assert_eq!(std::fs::read_dir(&cache).unwrap().count(), 1, "nothing else is left there");
+        // A folder that cannot be does not matter.
+        assert_eq!(lobe_bandwidth(&ggx(0.3), Some(&entry)), fresh);
+    }
+
+    #[test]
+    fn other_models_have_other_names() {
+        let table = |name| Model::Table(Arc::new(stand_in::table(name).unwrap()));
+        let names = [ggx(0.3), ggx(0.3 + 1e-12), table("rough"), table("rubber")].map(|m| key(&m));
+        let distinct: std::collections::BTreeSet<_> = names.iter().collect();
+        assert_eq!(distinct.len(), names.len());
+        assert_eq!(key(&table("rough")), names[2]);
+    }
+}
