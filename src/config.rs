@@ -1,6 +1,7 @@
 //! What a renderer is built for. Everything here is fixed until [`crate::Renderer::resize`] or a new renderer.
 
 use crate::error::{Error, Result};
+use crate::frequency::operators::{Combine, Operator};
 use crate::gpu::pipeline::Modules;
 use ash::vk;
 
@@ -31,6 +32,8 @@ pub enum Rate {
     Uniform(u32),
     /// A level for each sample, from [`crate::FrameInputs::levels`].
     Given,
+    /// The level at which the predicted bandwidth of the image asks for samples (Bagher 2011).
+    Bandwidth,
 }
 
 /// How a material is read at a pixel's scale.
@@ -73,8 +76,16 @@ pub struct Config {
     pub estimator: Estimator,
     /// Where samples are shaded.
     pub rate: Rate,
-    /// Coarsest level of [`Rate::Given`], 0 to 5, in output pixels; no cell is wider than 32 samples.
+    /// Coarsest level of [`Rate::Given`] and [`Rate::Bandwidth`], 0 to 5, in output pixels; no cell is wider than 32 samples.
     pub lmax: u32,
+    /// Directions in which the prediction looks, 1 to 64 a block of 2x2 samples (of a pixel, if that has more).
+    pub probes: u32,
+    /// Samples that a predicted cycle gets; by [`crate::frequency::level::samples_per_cycle`] if `None`.
+    pub samples_per_cycle: Option<f32>,
+    /// What the prediction takes for reflection.
+    pub operator: Operator,
+    /// How it combines its probes.
+    pub combine: Combine,
     /// How materials are read.
     pub filter: Filter,
     /// Whether the mesh's curvature widens lobes as [`Filter::Tk`] does, whatever the filter.
@@ -99,6 +110,10 @@ impl Config {
             estimator: Estimator::default(),
             rate: Rate::default(),
             lmax: 3,
+            probes: 4,
+            samples_per_cycle: None,
+            operator: Operator::default(),
+            combine: Combine::default(),
             filter: Filter::default(),
             geometric: false,
             directions: 64,
@@ -113,13 +128,18 @@ impl Config {
         self.geometric || self.filter == Filter::Tk
     }
 
+    /// Samples a side of the blocks that the prediction works on.
+    pub(crate) fn block_side(&self) -> u32 {
+        self.samples_per_side.max(2)
+    }
+
     /// The coarsest level of shading, in levels over a sample: 0 where every sample is shaded.
     pub(crate) fn coarsest(&self) -> u32 {
         let above = self.samples_per_side.ilog2();
         let level = match self.rate {
             Rate::Full => return 0,
             Rate::Uniform(level) => level,
-            Rate::Given => self.lmax,
+            Rate::Given | Rate::Bandwidth => self.lmax,
         };
         level.saturating_add(above).min(MAX_LEVEL)
     }
@@ -150,6 +170,9 @@ impl Config {
             "at most 16384 samples a side where samples are not all shaded",
             most.to_string(),
         )?;
+        check((1..=64).contains(&self.probes), "probes", "1 to 64", self.probes.to_string())?;
+        let rate = self.samples_per_cycle.unwrap_or(1.0);
+        check(rate > 0.0 && rate.is_finite(), "samples_per_cycle", "a finite number > 0", rate.to_string())?;
         let least = if self.estimator == Estimator::Mis { 2 } else { 1 };
         check((least..=65536).contains(&self.directions), "directions", &format!("{least} to 65536"), self.directions.to_string())
     }

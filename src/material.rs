@@ -1,7 +1,10 @@
 //! A reflectance and the textures that vary it over a surface; the f64 twin of looking them up.
 
 use crate::error::{Error, Result};
-use crate::reflectance::{BlinnPhong, Ggx, Model, Reflectance};
+use crate::frequency::TextureBandwidth;
+use crate::frequency::environment::EPS;
+use crate::frequency::wavelet::Grid;
+use crate::reflectance::{BlinnPhong, Ggx, LobeBandwidth, Model, Reflectance};
 use crate::texture::{Format, Texture};
 use glam::{DVec2, DVec3};
 use std::f64::consts::PI;
@@ -64,11 +67,13 @@ pub struct Material {
     pub model: Model,
     /// What varies it.
     pub maps: Maps,
+    /// How fast its lobes vary, if that is known; analysed when it is needed otherwise (a second for a table).
+    pub lobe_bandwidth: Option<Arc<LobeBandwidth>>,
 }
 
 impl From<Model> for Material {
     fn from(model: Model) -> Self {
-        Self { model, maps: Maps::default() }
+        Self::new(model, Maps::default())
     }
 }
 
@@ -101,6 +106,11 @@ pub fn geometric_kernel(dx: DVec3, dy: DVec3) -> f64 {
 }
 
 impl Material {
+    /// A reflectance with maps.
+    pub fn new(model: Model, maps: Maps) -> Self {
+        Self { model, maps, lobe_bandwidth: None }
+    }
+
     /// Refuses parameters and maps that the model does not take.
     ///
     /// # Errors
@@ -128,6 +138,33 @@ impl Material {
             return Err(Error::invalid("maps.tiling", "two finite numbers > 0", format!("{:?}", self.maps.tiling)));
         }
         Ok(())
+    }
+
+    /// The bandwidth of colours and roughness over the surface in cycles per texture unit: that which 95 % of the map with the
+    /// greatest stay below. Normals count as curvature. Maps of more than 1024 texels a side count as their mips.
+    pub fn texture_bandwidth(&self) -> f64 {
+        let [albedo, specular, _, roughness] = self.maps.textures();
+        let maps = [albedo, specular, roughness].into_iter().flatten();
+        let tiling = self.maps.tiling.map(f64::from);
+        let greatest = maps.map(|map| {
+            let size = map.size();
+            let level = size[0].max(size[1]).div_ceil(1024).next_power_of_two().ilog2();
+            let [width, height] = size.map(|side| (side >> level).max(1) as usize);
+            let luminance = |x: usize, y: usize| {
+                let uv = DVec2::new((x as f64 + 0.5) / width as f64, 1.0 - (y as f64 + 0.5) / height as f64);
+                let texel = map.sample(uv, f64::from(level)).truncate();
+                if map.format() == Format::Half1 { texel.x } else { crate::sampling::luminance(texel) }
+            };
+            let bandwidth = TextureBandwidth::of(&Grid::from_fn(width, height, luminance), EPS);
+            let quantile = |grid: &Grid| {
+                let mut sorted = grid.values.clone();
+                sorted.sort_by(f64::total_cmp);
+                sorted.get((sorted.len() as f64 * 0.95) as usize).copied().unwrap_or(0.0)
+            };
+            let [u, v] = bandwidth.axes.each_ref().map(quantile);
+            (u * tiling[0]).max(v * tiling[1])
+        });
+        greatest.fold(0.0, f64::max)
     }
 
     /// What the maps hold at `uv`, where a pixel has the extent `footprint`: the derivatives of `uv` by its x and y, before

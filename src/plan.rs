@@ -18,6 +18,8 @@ pub(crate) struct Plan {
     pub levels: Levels,
     /// The level of each sample, where the renderer itself writes it.
     pub level: Option<ImageDesc>,
+    /// What the `bandwidth` pass finds in each block of samples.
+    pub prediction: Option<ImageDesc>,
     /// Linear radiance: of samples, and below them of cells of even levels.
     pub radiance: ImageDesc,
     /// Linear radiance of cells of odd levels, one level below another.
@@ -131,7 +133,11 @@ impl Plan {
             factors: image("factors", vk::Format::R32G32B32A32_UINT, shading, storage),
             curvature: config.curvature.then(|| image("curvature", vk::Format::R16G16B16A16_SFLOAT, shading, storage)),
             level: (levels.top > 0 && config.rate != Rate::Given)
-                .then(|| image("level", vk::Format::R32_UINT, shading, sampled | vk::ImageUsageFlags::TRANSFER_DST)),
+                .then(|| image("level", vk::Format::R32_UINT, shading, storage | vk::ImageUsageFlags::TRANSFER_DST)),
+            prediction: (config.rate == Rate::Bandwidth).then(|| {
+                let blocks = shading.map(|e| e.div_ceil(config.block_side()));
+                image("prediction", vk::Format::R16G16B16A16_SFLOAT, blocks, storage)
+            }),
             radiance: values("radiance", shading[0], even_rows),
             odd: (levels.top > 0).then(|| values("odd", shading[0].div_ceil(2), odd_rows)),
             levels,
@@ -140,7 +146,12 @@ impl Plan {
     }
 
     fn images(&self) -> impl Iterator<Item = &ImageDesc> {
-        let values = self.level.iter().chain(&self.odd).chain([&self.normals, &self.factors, &self.radiance, &self.resolved]);
+        let values = self.level.iter().chain(&self.prediction).chain(&self.odd).chain([
+            &self.normals,
+            &self.factors,
+            &self.radiance,
+            &self.resolved,
+        ]);
         self.gbuffer.iter().flatten().chain(&self.curvature).chain(values)
     }
 

@@ -1,6 +1,6 @@
 //! The frame, readable top to bottom: which pass, in which order, on which images.
 
-use crate::config::{Config, GBufferSource};
+use crate::config::{Config, GBufferSource, Rate};
 use crate::error::{Error, Result};
 use crate::frame::{FrameInputs, GBufferInput, Output};
 use crate::gpu::access::Access;
@@ -20,8 +20,8 @@ use crate::pass::environment::{EnvironmentImages, EnvironmentUpload};
 use crate::pass::gbuffer::{self, GBuffer};
 use crate::pass::materials::{MaterialBridge, MaterialImages, MaterialsUpload};
 use crate::pass::{
-    FrameUniform, PassContext, classify, curvature, environment_bandwidth, filter, level, pyramid, resolve, shade, tonemap,
-    upsample,
+    FrameUniform, PassContext, bandwidth, classify, curvature, environment_bandwidth, filter, level, pyramid, resolve, shade,
+    tonemap, upsample,
 };
 use crate::plan::{Directions, LIGHT_BYTES};
 use crate::sampling::LatLong;
@@ -33,6 +33,7 @@ struct Passes {
     environment_bandwidth: environment_bandwidth::EnvironmentBandwidth,
     gbuffer: Option<GBuffer>,
     curvature: Option<curvature::Curvature>,
+    bandwidth: Option<bandwidth::Bandwidth>,
     pyramid: Option<pyramid::Pyramid>,
     classify: classify::Classify,
     shade: shade::Shade,
@@ -160,8 +161,9 @@ impl Renderer {
     ) -> Result<Retired> {
         let bridge = BridgeLayouts { gbuffer: layout(&self.passes.gbuffer, &self.config), materials: self.bridge.layout };
         let (modules, slots, widened) = (&self.config.modules, self.config.frames_in_flight, self.config.widened());
+        let predicted = self.config.rate == Rate::Bandwidth;
         let (upload, filter) = Build::run(&self.cx, memory, |build| {
-            let upload = MaterialsUpload::new(build, materials, widened)?;
+            let upload = MaterialsUpload::new(build, materials, widened, predicted)?;
             let filter = filter::Filter::new(&mut PassContext { build, modules, bridge, slots }, upload.uses(), widened)?;
             Ok((upload, filter))
         })?;
@@ -230,9 +232,33 @@ impl Renderer {
             pass.record(rec, &curvature::Io { frame, bridge, samplers, normals, curvature });
         }
 
-        // 4  The level of every sample: the same, or the host's.
+        // 4  The level of every sample: predicted, the same, or the host's.
         let shading = targets.plan.shading;
+        let analysed = environment.bandwidth.as_ref().zip(materials.lobe_bandwidth.as_ref());
+        let predict = passes.bandwidth.as_ref().zip(analysed).zip(targets.prediction.as_ref());
         let level = match (&targets.level, &inputs.levels) {
+            (Some(level), _) if let Some(((pass, (environment_bandwidth, lobe_bandwidth)), prediction)) = predict => {
+                pass.record(
+                    rec,
+                    &bandwidth::Io {
+                        frame,
+                        bridge,
+                        samplers,
+                        environment,
+                        environment_bandwidth,
+                        materials,
+                        lobe_bandwidth,
+                        normals,
+                        factors,
+                        lights,
+                        light_count: exact + area,
+                        level,
+                        prediction,
+                    },
+                );
+                rec.image(level, Access::COMPUTE_SAMPLED);
+                Some(level.view)
+            }
             (Some(level), _) => {
                 level::record(rec, &level::Io { level, value: targets.plan.levels.top });
                 rec.image(level, Access::COMPUTE_SAMPLED);
@@ -430,6 +456,7 @@ impl Passes {
             environment_bandwidth: environment_bandwidth::EnvironmentBandwidth::new(&mut p)?,
             gbuffer,
             curvature: config.curvature.then(|| curvature::Curvature::new(&mut p)).transpose()?,
+            bandwidth: (config.rate == Rate::Bandwidth).then(|| bandwidth::Bandwidth::new(&mut p, config)).transpose()?,
             pyramid: (top > 0).then(|| pyramid::Pyramid::new(&mut p, top)).transpose()?,
             classify: classify::Classify::new(&mut p, top)?,
             shade: shade::Shade::new(&mut p, config, top > 0)?,
@@ -445,6 +472,9 @@ impl Passes {
             pass.retire(bag);
         }
         if let Some(pass) = self.curvature {
+            pass.retire(bag);
+        }
+        if let Some(pass) = self.bandwidth {
             pass.retire(bag);
         }
         if let Some(pass) = self.pyramid {

@@ -20,6 +20,8 @@ pub(crate) struct Targets {
     pub curvature: Option<Image>,
     /// The level of each sample, where the renderer itself writes it.
     pub level: Option<Image>,
+    /// What the `bandwidth` pass finds in each block of samples.
+    pub prediction: Option<Image>,
     pub cells: Option<CellBuffers>,
     pub radiance: Image,
     /// Radiance of odd levels.
@@ -76,6 +78,7 @@ impl Targets {
             factors: Image::new(build, plan.factors)?,
             curvature: plan.curvature.map(|desc| Image::new(build, desc)).transpose()?,
             level: plan.level.map(|desc| Image::new(build, desc)).transpose()?,
+            prediction: plan.prediction.map(|desc| Image::new(build, desc)).transpose()?,
             cells: (plan.levels.top > 0).then(|| CellBuffers::new(build, &plan)).transpose()?,
             radiance: Image::new(build, plan.radiance)?,
             odd: plan.odd.map(|desc| Image::new(build, desc)).transpose()?,
@@ -90,7 +93,7 @@ impl Targets {
     #[cfg(feature = "offline")]
     pub fn image(&self, name: &str) -> Option<&Image> {
         let gbuffer = self.gbuffer.as_ref().map(GBufferImages::colors);
-        let own = [&self.curvature, &self.level, &self.odd].into_iter().flatten();
+        let own = [&self.curvature, &self.level, &self.prediction, &self.odd].into_iter().flatten();
         let always = [&self.normals, &self.factors, &self.radiance, &self.resolved];
         let all = gbuffer.into_iter().flatten().chain(own).chain(always);
         all.into_iter().find(|image| image.desc.name == name)
@@ -113,7 +116,7 @@ impl Targets {
 
     pub fn retire(self, states: &mut States, bag: &mut Retired) {
         let images = self.gbuffer.into_iter().flat_map(GBufferImages::into_images);
-        let own = [self.curvature, self.level, self.odd].into_iter().flatten();
+        let own = [self.curvature, self.level, self.prediction, self.odd].into_iter().flatten();
         for image in images.chain(own).chain([self.normals, self.factors, self.radiance, self.resolved]) {
             states.forget(image.handle);
             image.retire(bag);

@@ -213,7 +213,7 @@ fn statistics_hold_every_field() {
 
     let passes = report["passes"].as_array().unwrap();
     let names: Vec<_> = passes.iter().map(|pass| pass["name"].as_str().unwrap()).collect();
-    assert_eq!(names, ["gbuffer", "curvature", "classify", "shade", "resolve"]);
+    assert_eq!(names, ["gbuffer", "filter", "curvature", "classify", "shade", "resolve"]);
     for pass in passes {
         let [median, low, high] = ["ms_median", "ms_p10", "ms_p90"].map(|key| pass[key].as_f64().unwrap());
         assert!(0.0 <= low && low <= median && median <= high, "{pass}");
@@ -243,7 +243,7 @@ fn coarse_rates_count_by_output_level() {
     assert!(number(&report, "/pixels/shaded") < 0.25 * number(&report, "/pixels/covered"));
     assert_eq!(number(&report, "/samples/taken"), 2.0 * number(&report, "/pixels/shaded"));
     let names: Vec<_> = report["passes"].as_array().unwrap().iter().map(|pass| pass["name"].as_str().unwrap()).collect();
-    assert_eq!(names, ["gbuffer", "level", "pyramid", "classify", "shade", "upsample", "resolve"]);
+    assert_eq!(names, ["gbuffer", "filter", "level", "pyramid", "classify", "shade", "upsample", "resolve"]);
     let image = folder.exr("out.exr");
     let layer = |name: &str| image.channel(name).unwrap();
     for (i, alpha) in layer("A").iter().enumerate().filter(|(_, alpha)| **alpha == 1.0) {

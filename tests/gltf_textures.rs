@@ -51,7 +51,7 @@ fn gltf(material: serde_json::Value, images: &[Vec<u8>], uvs: bool) -> Result<Wo
 /// What is shaded at a texel's centre.
 fn shaded(world: &World, uv: DVec2) -> Ggx {
     let m = &world.materials[0];
-    let material = Material { model: m.model.clone(), maps: m.maps.clone() };
+    let material = Material::new(m.model.clone(), m.maps.clone());
     material.validate().unwrap();
     let Model::Ggx(ggx) = material.model else { panic!("{:?}", material.model) };
     let point = material.at(uv, [DVec2::ZERO; 2]);

@@ -190,9 +190,9 @@ fn shading_is_saved_and_counted() {
         (f64::from(session.shaded().unwrap()), passes)
     };
     let (full, passes) = shaded(Rate::Full, 1);
-    assert_eq!(passes, ["gbuffer", "classify", "shade", "resolve"], "nothing else at the full rate");
+    assert_eq!(passes, ["gbuffer", "filter", "classify", "shade", "resolve"], "nothing else at the full rate");
     let (half, passes) = shaded(Rate::Uniform(1), 1);
-    assert_eq!(passes, ["gbuffer", "level", "pyramid", "classify", "shade", "upsample", "resolve"]);
+    assert_eq!(passes, ["gbuffer", "filter", "level", "pyramid", "classify", "shade", "upsample", "resolve"]);
     let (quarter, _) = shaded(Rate::Uniform(2), 1);
     assert!((0.25..0.30).contains(&(half / full)), "{half} of {full}");
     assert!((0.0625..0.10).contains(&(quarter / full)), "{quarter} of {full}");

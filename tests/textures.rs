@@ -193,7 +193,7 @@ fn maps_do_to_each_model_what_they_say() {
     };
     let [tint, shine] = [tint, shine].map(|c| DVec3::from(c.map(f64::from)));
     let at = |model: Model, maps: Maps| {
-        let material = Material { model, maps };
+        let material = Material::new(model, maps);
         material.validate().unwrap();
         material.at(DVec2::ZERO, [DVec2::ZERO; 2]).reflectance(&material.model)
     };
@@ -220,7 +220,7 @@ fn maps_do_to_each_model_what_they_say() {
 fn roughness_is_clamped_to_what_models_accept() {
     let roughness = |model: Model, value: f32, kind| {
         let maps = Maps { roughness: Some((scalar(value), kind)), ..Maps::default() };
-        let material = Material { model, maps };
+        let material = Material::new(model, maps);
         let point = material.at(DVec2::ZERO, [DVec2::ZERO; 2]);
         let reflectance = point.reflectance(&material.model);
         let [wi, wo] = directions(1);
@@ -253,6 +253,7 @@ fn normals_and_roughness_come_from_level_0_and_colours_through_mips() {
     let slopes: Vec<_> = (0..16).map(|i| if i % 2 == 0 { [0.6, 0.0, 0.8] } else { [-0.6, 0.0, 0.8] }).collect();
     let alphas: Vec<_> = (0..16).map(|i| if i % 2 == 0 { 0.25 } else { 0.75 }).collect();
     let material = Material {
+        lobe_bandwidth: None,
         model: ggx(),
         maps: Maps {
             albedo: Some(Arc::new(Texture::colour(size, &checks).unwrap())),
@@ -283,7 +284,7 @@ fn normals_and_roughness_come_from_level_0_and_colours_through_mips() {
 fn maps_that_a_model_does_not_take_are_refused() {
     let flat = Arc::new(Texture::normals([1, 1], &[[0.0, 0.0, 1.0]]).unwrap());
     let refused = |model: Model, maps: Maps, word: &str| {
-        let e = Material { model, maps }.validate().unwrap_err();
+        let e = Material::new(model, maps).validate().unwrap_err();
         assert!(e.to_string().contains(word), "{e}");
     };
     refused(ggx(), Maps { albedo: Some(flat.clone()), ..Maps::default() }, "maps.albedo");
@@ -315,6 +316,7 @@ fn classes_share_what_is_the_same() {
     let (a, b) = (of_size([8, 8], Format::Srgb8), of_size([8, 8], Format::Srgb8));
     let n = of_size([8, 8], Format::Half2);
     let with = |albedo: &Arc<Texture>, normal: Option<&Arc<Texture>>| Material {
+        lobe_bandwidth: None,
         model: ggx(),
         maps: Maps { albedo: Some(albedo.clone()), specular: Some(a.clone()), normal: normal.cloned(), ..Maps::default() },
     };
@@ -334,7 +336,7 @@ fn too_many_classes_merge_where_it_costs_least() {
     let sides = [512, 300, 64, 60, 32, 16, 8, 4, 2];
     let textures: Vec<_> = sides.iter().map(|s| of_size([*s, *s], Format::Half4)).collect();
     let mut materials: Vec<_> =
-        textures.iter().map(|t| Material { model: ggx(), maps: Maps { albedo: Some(t.clone()), ..Maps::default() } }).collect();
+        textures.iter().map(|t| Material::new(ggx(), Maps { albedo: Some(t.clone()), ..Maps::default() })).collect();
     materials[0].maps.normal = Some(of_size([2, 2], Format::Half2));
     let classes = Classes::of(&materials);
     let mut sizes: Vec<_> = classes.classes.iter().map(|c| (c.size[0], c.format, c.layers.len())).collect();
@@ -358,7 +360,7 @@ fn too_many_classes_merge_where_it_costs_least() {
 }
 
 fn painted(albedo: &Arc<Texture>) -> Material {
-    Material { model: ggx(), maps: Maps { albedo: Some(albedo.clone()), ..Maps::default() } }
+    Material::new(ggx(), Maps { albedo: Some(albedo.clone()), ..Maps::default() })
 }
 
 #[test]

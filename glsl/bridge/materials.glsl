@@ -43,6 +43,7 @@ struct MaterialRecord {
     vec4 f0;
     vec4 albedo;
     vec4 importance; // first of its importance tables; the number of the last step; log2 of alpha squared of the first; steps per log2
+    vec4 texture_bandwidth; // x: of its colour and roughness maps, in cycles per texture unit
 };
 
 layout(set = 1, binding = 0, std430) readonly buffer Materials {
@@ -60,6 +61,7 @@ struct Material {
     vec2 table;      // first texel of its table in y, z
     vec3 turn;       // cosine and sine of the angle from the tangent frame's x axis to the local one; handedness
     vec2 lobe;       // concentration and density at the centre of a lobe of weight 1, where a map replaces the lobes' own
+    float sharpness; // of lobes, over that of the material's own
     float kernel;    // added to 2 / concentration of the lobes' own
     float area;      // projected area of the lobes so widened
 };
@@ -79,8 +81,10 @@ Material material_load(uint id, float cos_o, vec3 turn, Factors factors) {
     bool cosine = kind == REFLECTANCE_BLINN_PHONG;
     float own = m.record.f0.w;
     float square = vmf ? m.record.albedo.w : (cosine ? 2.0 / (own + 2.0) : own * own);
+    float before = square;
     square = (rough ? factors.alpha * factors.alpha : square) + factors.kernel;
     bool changed = rough || factors.kernel > 0.0;
+    m.sharpness = changed ? sqrt(before / square) : 1.0;
     float narrow = min(square, 1.0);
     m.record.f0.w = changed && !table && !vmf ? (cosine ? 2.0 / narrow - 2.0 : sqrt(narrow)) : own;
     float kappa = 2.0 / square;

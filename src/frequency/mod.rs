@@ -14,3 +14,4 @@ pub mod wavelet;
 
 pub use environment::AngularBandwidth;
 pub use operators::Operator;
+pub use texture::TextureBandwidth;

@@ -9,7 +9,7 @@ use crate::offline::session::Session;
 pub enum Aov {
     /// Distance along the view axis in metres; 0 for the background.
     Depth,
-    /// World normal as interpolated.
+    /// World shading normal, by the normal map where there is one.
     Normal,
     /// Material index, -1 for the background.
     Material,
@@ -25,13 +25,17 @@ pub enum Aov {
     Level,
     /// Valid share of the weight of the sample's parents, in steps of 1/63; 0 where it was shaded without asking them.
     Weight,
+    /// Predicted bandwidth of the image in cycles a pixel.
+    Bandwidth,
+    /// Standard deviation of the probes' integrand over its mean.
+    Spread,
     /// 1 where the sample was shaded by itself.
     Shaded,
     /// Directions drawn for the sample.
     Samples,
 }
 
-const ALL: [(&str, Aov); 11] = [
+const ALL: [(&str, Aov); 13] = [
     ("depth", Aov::Depth),
     ("normal", Aov::Normal),
     ("material", Aov::Material),
@@ -41,10 +45,12 @@ const ALL: [(&str, Aov); 11] = [
     ("curvature", Aov::Curvature),
     ("level", Aov::Level),
     ("weight", Aov::Weight),
+    ("bandwidth", Aov::Bandwidth),
+    ("spread", Aov::Spread),
     ("shaded", Aov::Shaded),
     ("samples", Aov::Samples),
 ];
-const LATER: [&str; 4] = ["bandwidth", "spread", "lobes", "mip"];
+const LATER: [&str; 2] = ["lobes", "mip"];
 
 impl std::str::FromStr for Aov {
     type Err = Error;
@@ -126,7 +132,7 @@ impl Aov {
         let scalar = |values: Vec<f32>| Ok(vec![(format!("{name}.Y"), values)]);
         match self {
             Self::Depth => float("surface", "Z", 3, session),
-            Self::Normal => float("surface", "XYZ", 0, session),
+            Self::Normal => float("normals", "XYZ", 0, session),
             Self::Uv => float("coordinate", "XY", 0, session),
             Self::Footprint => float("derivative", "XYZW", 0, session),
             Self::Curvature => float("curvature", "XY", 0, session),
@@ -140,6 +146,21 @@ impl Aov {
             Self::Weight => {
                 let weights = levels::weights(session)?.into_iter().map(f32::to_bits).collect();
                 scalar(covered.of(weights).map(|t| f32::from_bits(t[0])))
+            }
+            Self::Bandwidth | Self::Spread => {
+                let none = |_| Error::argument(&format!("--aov {name}"), "--rate bandwidth beside it", "another rate");
+                let (bytes, _, [width, _]) = session.image("prediction").map_err(none)?;
+                let halves: Vec<half::f16> = bytemuck::pod_collect_to_vec(&bytes);
+                let block = side.max(2) as usize;
+                // Of samples to of pixels.
+                let unit = if self == Self::Bandwidth { side as f32 } else { 1.0 };
+                let value = |i: usize| {
+                    let [x, y] = [i % covered.width / block, i / covered.width / block];
+                    let at = 4 * (y * width as usize + x) + usize::from(self == Self::Spread);
+                    (halves.get(at).map_or(0.0, |h| h.to_f32()) * unit).to_bits()
+                };
+                let all = covered.of((0..covered.words.len()).map(value).collect()).map(|t| f32::from_bits(t[0]));
+                scalar(all.iter().zip(mask).map(|(v, mask)| if mask > 0.0 { *v } else { 0.0 }).collect())
             }
             Self::Shaded | Self::Samples => {
                 let mut shaded = vec![0; covered.words.len()];

@@ -1,5 +1,6 @@
 //! A still image of a world, with its layers and statistics.
 
+use crate::frequency::operators::{Combine, Operator};
 use crate::gpu::timer::FrameTimings;
 use crate::offline::aov::Aov;
 use crate::offline::error::Result;
@@ -30,6 +31,14 @@ pub struct Settings {
     pub rate: Rate,
     /// Coarsest level, in output pixels; `None` is the default.
     pub lmax: Option<u32>,
+    /// Directions in which the prediction of bandwidth looks.
+    pub probes: u32,
+    /// Samples that a predicted cycle gets; `None` is the rule.
+    pub samples_per_cycle: Option<f32>,
+    /// What the prediction takes for reflection.
+    pub operator: Operator,
+    /// How it combines its probes.
+    pub combine: Combine,
     /// How materials are read.
     pub filter: Filter,
     /// Whether the mesh's curvature widens lobes, whatever the filter.
@@ -61,6 +70,10 @@ impl Settings {
             estimator: if self.reference.is_some() { Estimator::Mis } else { self.estimator },
             rate: if self.reference.is_some() { Rate::Full } else { self.rate },
             lmax: self.lmax.unwrap_or(base.lmax),
+            probes: self.probes,
+            samples_per_cycle: self.samples_per_cycle,
+            operator: self.operator,
+            combine: self.combine,
             filter: self.filter,
             geometric: self.geometric,
             directions: self.reference.map_or(self.samples, |n| n.min(REFERENCE_CHUNK)),
@@ -149,11 +162,16 @@ fn statistics(
         Rate::Uniform(2) => "quarter",
         Rate::Uniform(_) => "uniform",
         Rate::Given => "given",
+        Rate::Bandwidth => "bandwidth",
     };
     let values = BTreeMap::from([
         ("rate", json!(rate)),
         ("lmax", json!(config.lmax)),
         ("filter", json!(if config.filter == Filter::Tk { "tk" } else { "point" })),
+        ("probes", json!(config.probes)),
+        ("spc", json!(config.samples_per_cycle)),
+        ("operator", json!(format!("{:?}", config.operator).to_lowercase())),
+        ("combine", json!(format!("{:?}", config.combine).to_lowercase())),
         ("geometric", json!(config.geometric)),
         ("estimator", json!(estimator)),
         ("samples", json!(config.directions)),

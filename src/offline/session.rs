@@ -11,6 +11,7 @@ use crate::gpu::timer::FrameTimings;
 use crate::gpu::upload::{BufferUpload, ImageUpload};
 use crate::offline::error::{Error, Result};
 use crate::offline::headless::Headless;
+use crate::offline::lobe_cache;
 use crate::offline::mesh::Mesh;
 use crate::offline::world::{Camera, World};
 use crate::pass::PassContext;
@@ -109,7 +110,14 @@ impl Session {
         setup.push(("pipelines", milliseconds(clock)));
 
         let clock = Instant::now();
-        let materials: Vec<_> = world.materials.iter().map(|m| m.surface()).collect();
+        let mut materials: Vec<_> = world.materials.iter().map(|m| m.surface()).collect();
+        if config.rate == crate::Rate::Bandwidth {
+            let folder = lobe_cache::cache_folder();
+            let analyse = |m: &mut crate::Material| {
+                m.lobe_bandwidth = Some(Arc::new(lobe_cache::lobe_bandwidth(&m.model, folder.as_deref())));
+            };
+            materials.iter_mut().for_each(analyse);
+        }
         // SAFETY: the command buffer is recording and submitted at once.
         headless.submit(|cmd, memory| Ok(unsafe { renderer.record_materials(cmd, &materials, memory) }?))?;
         setup.push((crate::pass::materials::NAME, milliseconds(clock)));

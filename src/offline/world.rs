@@ -89,7 +89,7 @@ pub struct Material {
 impl Material {
     /// Without the name.
     pub fn surface(&self) -> crate::Material {
-        crate::Material { model: self.model.clone(), maps: self.maps.clone() }
+        crate::Material::new(self.model.clone(), self.maps.clone())
     }
 }
 

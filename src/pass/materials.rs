@@ -14,7 +14,7 @@ use crate::pass::maps::{MapImages, MapsUpload, Uses};
 use crate::reflectance::importance::{COLUMNS, DENSITY_COLUMNS, DENSITY_ROWS, ImportanceTable, ROWS, VIEW_ANGLES};
 use crate::reflectance::ladder::{Ladder, own_square};
 use crate::reflectance::merl::{PHI_DIFF, THETA_DIFF, THETA_HALF};
-use crate::reflectance::{Lobe, MerlTable, Model};
+use crate::reflectance::{Lobe, LobeBandwidth, MerlTable, Model, bandwidth};
 use ash::vk;
 use bytemuck::{Pod, Zeroable};
 use glam::DVec3;
@@ -46,6 +46,7 @@ struct Record {
     f0: [f32; 4],
     albedo: [f32; 4],
     importance: [f32; 4],
+    texture_bandwidth: [f32; 4],
 }
 
 /// What the shaders read.
@@ -55,6 +56,8 @@ pub(crate) struct MaterialImages {
     importance: Image,
     density: Image,
     pub maps: MapImages,
+    /// Of the lobes, in cycles/radian, if the frame predicts bandwidth.
+    pub lobe_bandwidth: Option<Image>,
 }
 
 /// Created and filled, not yet recorded.
@@ -64,6 +67,7 @@ pub(crate) struct MaterialsUpload {
     importance: ImageUpload,
     density: ImageUpload,
     maps: MapsUpload,
+    lobe_bandwidth: Option<ImageUpload>,
 }
 
 /// Where table number `i` of `count` stands in the atlas, and the atlas's size, in tables along theta_d and theta_h: as square
@@ -118,7 +122,7 @@ fn records(materials: &[Material], tables: &Tables<'_>, importance: &[[f32; 4]],
         .map(|((Material { model, .. }, &slot), &importance)| {
             let scale = tables.all.get(slot).map_or(1.0, |t| t.1);
             let slot = slot as u32;
-            let record = |kind, f0, albedo| Record { kind, f0, albedo, importance };
+            let record = |kind, f0, albedo| Record { kind, f0, albedo, importance, texture_bandwidth: [0.0; 4] };
             match model {
                 Model::Table(_) => record([0, slot % columns, slot / columns, 0], [1.0; 4], [1.0, 1.0, 1.0, scale]),
                 Model::Ggx(g) => record([1, 0, 0, 0], with(g.f0, g.alpha), with(g.albedo, 1.0)),
@@ -132,6 +136,7 @@ fn records(materials: &[Material], tables: &Tables<'_>, importance: &[[f32; 4]],
                         f0: with(l.mu, l.kappa),
                         albedo: [*peak as f32, l.weight as f32, 0.0, 0.0],
                         importance: [0.0; 4],
+                        texture_bandwidth: [0.0; 4],
                     };
                     lobes.extend(vmf.lobes().iter().zip(vmf.peaks()).map(lobe));
                     let kind = [3, first as u32, vmf.lobes().len() as u32, 0];
@@ -161,9 +166,30 @@ fn importance_tables(materials: &[Material], ladders: &[Ladder]) -> Vec<Importan
     })
 }
 
+/// The lobes' bandwidths of all materials, one strip below the other; each reflectance is analysed once.
+fn lobe_bandwidths(materials: &[Material]) -> Vec<f32> {
+    let mut known: Vec<(*const u8, Arc<LobeBandwidth>)> = Vec::new();
+    let mut texels = Vec::with_capacity(materials.len() * bandwidth::WIDTH * bandwidth::SIDE);
+    for material in materials {
+        let key: *const u8 = match &material.model {
+            Model::Table(table) => Arc::as_ptr(table).cast(),
+            Model::Turned(turned) => Arc::as_ptr(turned).cast(),
+            Model::Ggx(_) | Model::BlinnPhong(_) | Model::Vmf(_) => std::ptr::null(),
+        };
+        let found = known.iter().find(|k| k.0 == key && !key.is_null()).map(|k| Arc::clone(&k.1));
+        let lobes = found.or_else(|| material.lobe_bandwidth.clone()).unwrap_or_else(|| {
+            let built = Arc::new(LobeBandwidth::build(&material.model));
+            known.push((key, Arc::clone(&built)));
+            built
+        });
+        texels.extend_from_slice(lobes.texels());
+    }
+    texels
+}
+
 impl MaterialsUpload {
-    /// `widened` says whether a filter widens lobes.
-    pub fn new(build: &mut Build<'_>, materials: &[Material], widened: bool) -> Result<Self> {
+    /// `widened` says whether a filter widens lobes, `predicted` whether the frame predicts bandwidth.
+    pub fn new(build: &mut Build<'_>, materials: &[Material], widened: bool, predicted: bool) -> Result<Self> {
         if materials.is_empty() || materials.len() > MAX_MATERIALS {
             return Err(Error::invalid("materials", format!("1 to {MAX_MATERIALS}"), materials.len()));
         }
@@ -182,7 +208,12 @@ impl MaterialsUpload {
         let ladders: Vec<_> = materials.iter().map(|m| Ladder::of(m, widened)).collect();
         let firsts = ladders.iter().scan(0, |next, ladder| Some(std::mem::replace(next, *next + ladder.steps())));
         let places: Vec<_> = ladders.iter().zip(firsts).map(|(ladder, first)| ladder.record(first)).collect();
-        let records = records(materials, &tables, &places, atlas[0]);
+        let mut records = records(materials, &tables, &places, atlas[0]);
+        let lobes = predicted.then(|| lobe_bandwidths(materials));
+        if predicted {
+            let bandwidths = materials.iter().map(|m| m.texture_bandwidth() as f32);
+            records.iter_mut().zip(bandwidths).for_each(|(record, b)| record.texture_bandwidth = [b; 4]);
+        }
         let importance = importance_tables(materials, &ladders);
         let image = |name, format, extent| ImageDesc::new(name, format, extent, vk::ImageUsageFlags::SAMPLED);
         let angles = VIEW_ANGLES as u32;
@@ -216,6 +247,13 @@ impl MaterialsUpload {
                 bytemuck::cast_slice(&density),
             )?,
             maps: MapsUpload::new(build, materials)?,
+            lobe_bandwidth: lobes
+                .map(|texels| {
+                    let extent = [bandwidth::WIDTH as u32, (bandwidth::SIDE * materials.len()) as u32, 1];
+                    let desc = image("lobe bandwidth", vk::Format::R32_SFLOAT, extent);
+                    ImageUpload::new(build, desc, bytemuck::cast_slice(&texels))
+                })
+                .transpose()?,
         })
     }
 
@@ -231,6 +269,7 @@ impl MaterialsUpload {
             importance: self.importance.record(rec, bag),
             density: self.density.record(rec, bag),
             maps: self.maps.record(rec, bag),
+            lobe_bandwidth: self.lobe_bandwidth.map(|upload| upload.record(rec, bag)),
         }
     }
 }
@@ -289,7 +328,7 @@ impl MaterialImages {
     pub fn retire(self, states: &mut States, bag: &mut Retired) {
         states.forget(self.records.handle);
         self.records.retire(bag);
-        for image in [self.tables, self.importance, self.density] {
+        for image in [self.tables, self.importance, self.density].into_iter().chain(self.lobe_bandwidth) {
             states.forget(image.handle);
             image.retire(bag);
         }

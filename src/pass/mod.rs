@@ -1,6 +1,7 @@
 //! The frame's passes, one file each, all of one shape: name, push constants, `Io` (all that it reads and writes), the
 //! pass, `new`, `record`.
 
+pub mod bandwidth;
 pub mod classify;
 pub mod curvature;
 pub mod environment;
@@ -47,7 +48,7 @@ pub(crate) struct PassContext<'a, 'b> {
 
 /// The shader interfaces of all compute modules, for tests and host profilers.
 pub fn interfaces() -> Vec<Interface> {
-    let mut all = vec![filter::INTERFACE, curvature::INTERFACE, pyramid::INTERFACE];
+    let mut all = vec![filter::INTERFACE, curvature::INTERFACE, bandwidth::INTERFACE, pyramid::INTERFACE];
     all.extend(classify::INTERFACES);
     all.extend([shade::INTERFACE, upsample::INTERFACE, resolve::INTERFACE]);
     all.extend(tonemap::INTERFACES);

@@ -43,12 +43,12 @@ pub struct Args {
     /// How materials are read at a pixel's scale
     #[arg(long, default_value = "point")]
     filter: String,
-    /// Probes a pixel of the bandwidth prediction
-    #[arg(long, value_name = "N")]
+    /// Probes of the bandwidth prediction (4), 1 to 64 a block of 2x2 samples
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=64))]
     probes: Option<u32>,
-    /// Samples per true cycle of the bandwidth prediction
-    #[arg(long, value_name = "X|auto")]
-    spc: Option<String>,
+    /// Samples that a predicted cycle gets: a number, or auto (4 at 64 samples, rising with their fourth root)
+    #[arg(long, value_name = "X|auto", default_value = "auto", value_parser = samples_per_cycle)]
+    spc: SamplesPerCycle,
     /// Seed of the sample points
     #[arg(long, value_name = "N", default_value_t = 0)]
     seed: u32,
@@ -121,6 +121,18 @@ const FILTERS: [&str; 19] = [
     "bruteforce",
 ];
 
+/// `None` is auto.
+#[derive(Clone, Copy)]
+struct SamplesPerCycle(Option<f32>);
+
+fn samples_per_cycle(text: &str) -> std::result::Result<SamplesPerCycle, String> {
+    if text == "auto" {
+        return Ok(SamplesPerCycle(None));
+    }
+    let rate = text.parse::<f32>().ok().filter(|x| x.is_finite() && *x > 0.0);
+    rate.map(|x| SamplesPerCycle(Some(x))).ok_or_else(|| format!("expected a number > 0 or auto, got {text}"))
+}
+
 fn size(text: &str) -> std::result::Result<[u32; 2], String> {
     let parse = |t: &str| t.parse::<u32>().ok().filter(|e| (1..=16384).contains(e));
     let sides = text.split_once('x').and_then(|(w, h)| Some([parse(w)?, parse(h)?]));
@@ -148,8 +160,9 @@ impl Args {
             Rate::Full => passband::Rate::Full,
             Rate::Half => passband::Rate::Uniform(1),
             Rate::Quarter => passband::Rate::Uniform(2),
-            Rate::Luminance | Rate::Bandwidth | Rate::Oracle => {
-                return Err(Error::NotSupportedYet { what: "--rate luminance, bandwidth and oracle".into() });
+            Rate::Bandwidth => passband::Rate::Bandwidth,
+            Rate::Luminance | Rate::Oracle => {
+                return Err(Error::NotSupportedYet { what: "--rate luminance and oracle".into() });
             }
         };
         let estimator = match self.estimator {
@@ -168,14 +181,16 @@ impl Args {
             "tk" => Filter::Tk,
             _ => return Err(Error::NotSupportedYet { what: "--filter other than point and tk".into() }),
         };
-        later(self.probes.is_some(), "--probes")?;
-        later(self.spc.is_some(), "--spc")?;
         later(self.frames.is_some(), "--frames")?;
         later(!self.literal.is_empty(), "--literal")?;
         Ok(Settings {
             extent: self.size.or(scene_size).unwrap_or([512, 512]),
             rate,
             lmax: scene.and_then(Scene::lmax),
+            probes: self.probes.unwrap_or(4),
+            samples_per_cycle: self.spc.0,
+            operator: scene.map(Scene::operator).unwrap_or_default(),
+            combine: scene.map(Scene::combine).unwrap_or_default(),
             filter,
             geometric: scene.is_some_and(Scene::geometric),
             samples: self.samples,

@@ -53,8 +53,6 @@ impl Check<'_> {
         self.each(&s.anisotropy, |c, v| c.number(v, "1 to 16", |v| (1.0..=16.0).contains(&v)))?;
         self.each(&s.lod_bias, |c, v| c.number(v, "-16 to 16", |v| v.abs() <= 16.0))?;
         let all = [
-            span(&s.operator),
-            span(&s.combine),
             span(&s.eps),
             span(&s.np_rule),
             span(&s.budget),

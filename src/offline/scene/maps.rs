@@ -123,7 +123,7 @@ impl Textures {
                 maps.normal = Some(self.texture(scene, file, Part::Colour, &format!("heights {scale}"), normals)?);
             }
         }
-        let material = crate::Material { model: model.clone(), maps };
+        let material = crate::Material::new(model.clone(), maps);
         material.validate().map_err(|e| invalid(scene, keys, e))?;
         Ok((material.maps, displacement))
     }

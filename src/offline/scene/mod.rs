@@ -1,5 +1,6 @@
 //! Scene files: TOML in, a resolved [`World`] out.
 
+use crate::frequency::operators::{Combine, Operator};
 use crate::offline::error::{At, Error, Result};
 use crate::offline::input;
 use crate::offline::world::World;
@@ -89,6 +90,23 @@ impl Scene {
     /// The coarsest level of shading that the scene asks for, if it does: 0 is an output pixel, +1 is 2x2 coarser.
     pub fn lmax(&self) -> Option<u32> {
         self.file.settings.lmax.as_ref().map(|v| *v.get_ref())
+    }
+
+    /// What the prediction of bandwidth takes for reflection.
+    pub fn operator(&self) -> Operator {
+        match self.file.settings.operator.as_ref().map(|v| v.get_ref().as_str()) {
+            Some("box") => Operator::Box,
+            Some("covariance") => Operator::Covariance,
+            _ => Operator::default(),
+        }
+    }
+
+    /// How it combines its probes.
+    pub fn combine(&self) -> Combine {
+        match self.file.settings.combine.as_ref().map(|v| v.get_ref().as_str()) {
+            Some("max") => Combine::Max,
+            _ => Combine::default(),
+        }
     }
 
     /// Whether the mesh's curvature widens lobes, whatever the filter.

@@ -1,0 +1,160 @@
+#version 460
+// Image bandwidth and level of every block of samples (Bagher 2011, sections 2.1 to 2.3, equations 3, 4 and 9, as corrected in
+// src/frequency): a few directions drawn from the reflectance tell how fast light and lobe vary where light comes from, the
+// surface's curvature and distance how fast that makes the image vary. One sample stands for a block of 2x2 samples, or of an
+// output pixel's if these are more.
+layout(set = 2, binding = 3) uniform sampler2D normals;  // as the filter pass writes them
+layout(constant_id = 2) const bool KERNEL = false;
+#define MATERIAL_KERNEL KERNEL
+#include "frame.glsl"
+#include "gbuffer.glsl"
+#include "materials.glsl"
+#include "local.glsl"
+#include "environment.glsl"
+#include "lights.glsl"
+#include "curvature.glsl"
+#include "bandwidth.glsl"
+#include "lobe_bandwidth.glsl"
+
+layout(local_size_x = 8, local_size_y = 8) in;
+
+layout(constant_id = 0) const int OPERATOR = OPERATOR_CLIPPED;
+// How the probes' bandwidths are combined, in the order of src/frequency/operators.rs.
+layout(constant_id = 1) const int COMBINE = 0;
+const int COMBINE_MEAN = 0;
+const int COMBINE_MAX = 1;
+// Whether the frame has lights beside the environment.
+layout(constant_id = 3) const bool LOCAL_LIGHTS = false;
+
+layout(set = 2, binding = 4) uniform usampler2D factors;
+layout(set = 2, binding = 5) uniform sampler2D environment_bandwidth; // cycles/radian
+layout(set = 2, binding = 6) uniform sampler2D lobe_bandwidths;       // cycles/radian
+layout(set = 2, binding = 7, r32ui) uniform writeonly uimage2D level; // of each sample, in levels over a sample
+layout(set = 2, binding = 8, rgba16f) uniform writeonly image2D prediction; // of each block: cycles/sample; standard deviation of the
+                                                                           // integrand over its mean
+layout(set = 2, binding = 9, std430) readonly buffer Lights {
+    LightRecord lights[]; // exact ones first
+};
+
+layout(push_constant) uniform Push {
+    int side;                // of a block, in samples
+    int probes;
+    float samples_per_cycle;
+    int coarsest;            // level
+} push;
+
+// Frequencies are finite: a light without extent varies faster than anything.
+const float SHARPEST = 1e6;
+
+// Sums over the probes of a block.
+struct Sums {
+    float weighted;  // bandwidth times weight
+    float weights;
+    float radiance;
+    float greatest;
+    float squares;   // of the weights
+};
+
+void add(inout Sums s, float bandwidth, float radiance, float reflected) {
+    float weight = radiance * reflected;
+    s.weighted += bandwidth * weight;
+    s.weights += weight;
+    s.radiance += radiance;
+    s.greatest = max(s.greatest, weight > 0.0 ? bandwidth : 0.0);
+    s.squares += weight * weight;
+}
+
+float luminance(vec3 c) {
+    return dot(c, vec3(0.2126, 0.7152, 0.0722));
+}
+
+void main() {
+    ivec2 block = ivec2(gl_GlobalInvocationID.xy);
+    ivec2 first = block * push.side, extent = ivec2(frame.extent.xy);
+    if (any(greaterThanEqual(first, extent))) {
+        return;
+    }
+    // The covered sample nearest to the middle stands for the block.
+    ivec2 at = first;
+    int nearest = 1 << 20;
+    for (int k = 0; k < push.side * push.side; ++k) {
+        ivec2 o = ivec2(k % push.side, k / push.side);
+        ivec2 d = o * 2 - push.side + 1;
+        int distance = d.x * d.x + d.y * d.y;
+        ivec2 p = min(first + o, extent - 1);
+        bool nearer = gbuffer_covered(p) && distance < nearest;
+        nearest = nearer ? distance : nearest;
+        at = nearer ? p : at;
+    }
+    if (nearest == 1 << 20) {
+        return;
+    }
+    Place c = place_at(at);
+    vec4 normal = texelFetch(normals, at, 0);
+    float ray_length = length(c.ray);
+    Local f = local_frame(normal.xyz, -c.ray / ray_length);
+    vec3 point = frame.eye.xyz + c.ray * c.depth;
+    uint id = gbuffer_material(at);
+    Factors adjusted = factors_unpack(texelFetch(factors, at, 0));
+    Material m = material_load(id, f.view.z, tangent_turn(f, tangent_decode(normal.xyz, normal.w)), adjusted);
+
+    vec2 curvatures = principal_curvatures(c);
+    float distance = c.depth * ray_length;
+    // Of the image plane at distance 1, whose rays have length 1 along the view axis.
+    vec2 plane = ((vec2(at) + 0.5) / vec2(extent) * 2.0 - 1.0) * frame.ray.xy + frame.ray.zw;
+    float angle = pixel_angle(plane, abs(frame.ray.xy) * 2.0 / vec2(extent));
+
+    Sums s = Sums(0.0, 0.0, 0.0, 0.0, 0.0);
+    uvec2 seeds = sobol_seeds(hash(uint(block.y) << 16 | uint(block.x)) ^ frame.sampling.x);
+    for (int i = 0; i < push.probes; ++i) {
+        vec4 h = material_sample(m, sobol_point(uint(i), seeds));
+        float cos_d = dot(f.view, h.xyz);
+        vec3 wi = h.xyz * (2.0 * cos_d) - f.view;
+        bool above = cos_d > 0.0 && wi.z > 0.0;
+        wi = above ? wi : vec3(0.0, 0.0, 1.0);
+        h.xyz = above ? h.xyz : normalize(f.view + wi);
+        vec2 uv = latlong_uv(to_world(f, wi));
+        uv.x -= frame.environment.x;
+        float radiance = luminance(environment_fetch(uv).rgb);
+        float reflected = luminance(material_evaluate(m, wi, f.view, h.xyz)) * wi.z * 4.0 * cos_d / h.w;
+        float light = textureLod(environment_bandwidth, uv, 0.0).x;
+        float lobe = texelFetch(lobe_bandwidths, lobe_bandwidth_texel(int(id), wi, f.view), 0).x * m.sharpness;
+        float b = image_bandwidth(OPERATOR, light, lobe, curvatures, distance, f.view.z, angle);
+        add(s, b, above ? radiance : 0.0, above ? reflected : 0.0);
+    }
+    float mean = s.weights / float(push.probes);
+    float variance = max(s.squares / float(push.probes) - mean * mean, 0.0);
+
+    // Lights beside the environment: without extent, which is the safe side for those that have some.
+    for (uint i = 0u; LOCAL_LIGHTS && i < frame.lights.x + frame.lights.y; ++i) {
+        bool exact = i < frame.lights.x;
+        vec4 w = exact ? light_exact(lights[i], point) : vec4(normalize(lights[i].place.xyz - point), 1.0);
+        vec3 wi = vec3(dot(w.xyz, f.x), dot(w.xyz, f.y), dot(w.xyz, f.z));
+        bool above = wi.z > 0.0;
+        wi = above ? wi : vec3(0.0, 0.0, 1.0);
+        vec3 h = normalize(wi + f.view);
+        float solid = exact ? w.w : 1.0 / max(light_density(lights[i], point, w.xyz), 1e-6);
+        float radiance = luminance(lights[i].power.rgb) * solid;
+        float reflected = luminance(material_evaluate(m, wi, f.view, h)) * wi.z * float(push.probes);
+        float lobe = texelFetch(lobe_bandwidths, lobe_bandwidth_texel(int(id), wi, f.view), 0).x * m.sharpness;
+        float b = image_bandwidth(OPERATOR, SHARPEST, lobe, curvatures, distance, f.view.z, angle);
+        add(s, b, above ? radiance : 0.0, above ? reflected : 0.0);
+    }
+
+    float total = COMBINE == COMBINE_MEAN ? s.weights : s.radiance;
+    float b = COMBINE == COMBINE_MAX ? s.greatest : (total > 0.0 ? s.weighted / total : 0.0);
+    // Textures vary over the surface: their mips leave at most half a cycle a sample.
+    vec4 footprint = gbuffer_footprint(at);
+    float texture_units = sqrt(max(dot(footprint.xy, footprint.xy), dot(footprint.zw, footprint.zw)));
+    b += min(m.record.texture_bandwidth.x * texture_units, 0.5);
+    uint found = uint(bandwidth_level(b, push.samples_per_cycle, 0, push.coarsest));
+    imageStore(prediction, block, vec4(min(b, 6e4), min(mean > 0.0 ? sqrt(variance) / mean : 0.0, 6e4), 0.0, 0.0));
+    for (int k = 0; k < push.side * push.side; ++k) {
+        ivec2 p = first + ivec2(k % push.side, k / push.side);
+        if (all(lessThan(p, extent))) {
+            // Another object in the block is shaded as it is.
+            bool same = !gbuffer_covered(p) || gbuffer_object(p) == c.object;
+            imageStore(level, p, uvec4(same ? found : 0u));
+        }
+    }
+}

@@ -1,0 +1,140 @@
+//! Pass 4: image bandwidth and level of every block of samples (Bagher 2011, sections 2.1 to 2.3, equations 3, 4 and 9, as
+//! corrected in [`crate::frequency`]).
+
+use crate::config::Config;
+use crate::error::Result;
+use crate::frequency::level::samples_per_cycle;
+use crate::frequency::operators::{Combine, Operator};
+use crate::gpu::access::Access;
+use crate::gpu::buffer::Buffer;
+use crate::gpu::image::Image;
+use crate::gpu::pipeline::{BridgeSets, ComputePipeline, Interface, Resource};
+use crate::gpu::recorder::Recorder;
+use crate::gpu::retire::Retired;
+use crate::gpu::sampler::Samplers;
+use crate::pass::PassContext;
+use crate::pass::environment::EnvironmentImages;
+use crate::pass::materials::MaterialImages;
+use ash::vk::DescriptorType as D;
+use bytemuck::{Pod, Zeroable};
+
+/// Pass, shader, label, timer and AOV name.
+pub const NAME: &str = "bandwidth";
+
+/// Shader interface.
+pub const INTERFACE: Interface = Interface {
+    name: NAME,
+    local_size: [8, 8, 1],
+    push_bytes: size_of::<Push>() as u32,
+    gbuffer: true,
+    materials: true,
+    own: &[
+        D::UNIFORM_BUFFER,
+        D::COMBINED_IMAGE_SAMPLER,
+        D::COMBINED_IMAGE_SAMPLER,
+        D::COMBINED_IMAGE_SAMPLER,
+        D::COMBINED_IMAGE_SAMPLER,
+        D::COMBINED_IMAGE_SAMPLER,
+        D::COMBINED_IMAGE_SAMPLER,
+        D::STORAGE_IMAGE,
+        D::STORAGE_IMAGE,
+        D::STORAGE_BUFFER,
+    ],
+};
+
+#[repr(C)]
+#[derive(Clone, Copy, Pod, Zeroable)]
+struct Push {
+    side: i32,
+    probes: i32,
+    samples_per_cycle: f32,
+    coarsest: i32,
+}
+
+pub(crate) struct Io<'a> {
+    pub frame: &'a Buffer,
+    pub bridge: BridgeSets,
+    pub samplers: &'a Samplers,
+    pub environment: &'a EnvironmentImages,
+    /// Its bandwidth in cycles/radian.
+    pub environment_bandwidth: &'a Image,
+    pub materials: &'a MaterialImages,
+    /// Their lobes' bandwidths in cycles/radian.
+    pub lobe_bandwidth: &'a Image,
+    /// Of the `filter` pass.
+    pub normals: &'a Image,
+    pub factors: &'a Image,
+    /// Exact lights first.
+    pub lights: &'a Buffer,
+    pub light_count: u32,
+    /// Out: the level of each sample, in levels over a sample.
+    pub level: &'a Image,
+    /// Out: of each block, bandwidth in cycles/sample and the integrand's relative standard deviation.
+    pub prediction: &'a Image,
+}
+
+/// One pipeline for frames without lights beside the environment, one for frames with.
+pub(crate) struct Bandwidth {
+    pipelines: [ComputePipeline; 2],
+    push: Push,
+}
+
+impl Bandwidth {
+    pub fn new(p: &mut PassContext<'_, '_>, config: &Config) -> Result<Self> {
+        let operator = match config.operator {
+            Operator::Box => 0,
+            Operator::Clipped => 1,
+            Operator::Covariance => 2,
+        };
+        let combine = match config.combine {
+            Combine::Mean => 0,
+            Combine::Max => 1,
+            Combine::Literal => 2,
+        };
+        let mut make = |lights| {
+            let constants = [operator, combine, u32::from(config.widened()), lights];
+            ComputePipeline::new(p.build, p.modules, &INTERFACE, p.bridge, p.slots, &constants)
+        };
+        let rate = config.samples_per_cycle.unwrap_or(samples_per_cycle(config.directions) as f32);
+        let push = Push {
+            side: config.block_side() as i32,
+            probes: config.probes as i32,
+            samples_per_cycle: rate,
+            coarsest: config.coarsest() as i32,
+        };
+        Ok(Self { pipelines: [make(0)?, make(1)?], push })
+    }
+
+    pub fn record(&self, rec: &mut Recorder<'_>, io: &Io<'_>) {
+        rec.begin(NAME);
+        io.environment.sampled(rec);
+        io.materials.sampled(rec);
+        rec.image(io.environment_bandwidth, Access::COMPUTE_SAMPLED);
+        rec.image(io.lobe_bandwidth, Access::COMPUTE_SAMPLED);
+        rec.image(io.normals, Access::COMPUTE_SAMPLED);
+        rec.image(io.factors, Access::COMPUTE_SAMPLED);
+        rec.overwrite(io.level, Access::COMPUTE_WRITE);
+        rec.overwrite(io.prediction, Access::COMPUTE_WRITE);
+        rec.flush();
+        let resources = [
+            Resource::Uniform(io.frame),
+            Resource::Sampled(&io.environment.map, io.samplers.linear),
+            Resource::Sampled(&io.environment.alias, io.samplers.nearest),
+            Resource::Sampled(io.normals, io.samplers.nearest),
+            Resource::Sampled(io.factors, io.samplers.nearest),
+            Resource::Sampled(io.environment_bandwidth, io.samplers.nearest),
+            Resource::Sampled(io.lobe_bandwidth, io.samplers.nearest),
+            Resource::Storage(io.level.view),
+            Resource::Storage(io.prediction.view),
+            Resource::Buffer(io.lights),
+        ];
+        let pipeline = &self.pipelines[usize::from(io.light_count > 0)];
+        pipeline.bind(rec, io.bridge, &resources, &self.push);
+        pipeline.dispatch(rec, io.prediction.extent());
+        rec.end();
+    }
+
+    pub fn retire(self, bag: &mut Retired) {
+        self.pipelines.into_iter().for_each(|p| p.retire(bag));
+    }
+}
