@@ -1,10 +1,11 @@
 //! From image bandwidth to the level at which a pixel is shaded (Bagher et al. 2011, equation 9).
 
-/// Samples per true cycle at `directions` directions a shaded pixel: 4 at 64. The error of bilinear reconstruction falls with
-/// the square of the samples per cycle, the noise of an estimate with the root of its directions: a fourth root keeps them in
-/// step. (Eq. 9 to the letter, which takes an estimate that reads 4 times too high for cycles, is 4 as well.)
+/// Samples per predicted cycle at `directions` directions a shaded pixel: Nyquist's 2 at 64, rising with their root. Measured on
+/// the torus knot as a mirror under a photographed city: twice the samples a cycle take 6.7 dB off the error of reconstruction
+/// (42 dB at 1, 48.7 dB at 2), four times the directions 8.6 dB off the noise (38.6 dB at 64, 47.2 dB at 256), so that the first
+/// stays below the second.
 pub fn samples_per_cycle(directions: u32) -> f64 {
-    4.0 * (f64::from(directions.max(1)) / 64.0).powf(0.25)
+    2.0 * (f64::from(directions.max(1)) / 64.0).sqrt()
 }
 
 /// The level, 0 for one output pixel, +1 for twice as coarse a side: the coarsest with at least `samples_per_cycle` samples in
@@ -39,7 +40,7 @@ mod tests {
 
     #[test]
     fn more_directions_want_more_samples() {
-        assert_eq!(samples_per_cycle(64), 4.0);
-        assert!((samples_per_cycle(1024) - 8.0).abs() < 1e-12 && samples_per_cycle(0) > 0.0);
+        assert_eq!((samples_per_cycle(64), samples_per_cycle(1024)), (2.0, 8.0));
+        assert!(samples_per_cycle(0) > 0.0);
     }
 }

@@ -46,7 +46,7 @@ pub struct Args {
     /// Probes of the bandwidth prediction (4), 1 to 64 a block of 2x2 samples
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=64))]
     probes: Option<u32>,
-    /// Samples that a predicted cycle gets: a number, or auto (4 at 64 samples, rising with their fourth root)
+    /// Samples that a predicted cycle gets: a number, or auto (2 at 64 samples, rising with their root)
     #[arg(long, value_name = "X|auto", default_value = "auto", value_parser = samples_per_cycle)]
     spc: SamplesPerCycle,
     /// Seed of the sample points
