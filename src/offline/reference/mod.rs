@@ -134,7 +134,7 @@ impl<'a> Reference<'a> {
         let mut estimate = match (given, self.world.materials.get(hit.material)) {
             (Some(Some(reflectance)), _) => integrate(*reflectance),
             // Without maps, the model itself: a table need not be copied.
-            (None, Some(material)) if material.maps.is_empty() => integrate(&material.model),
+            (None, Some(material)) if material.maps.is_empty() && hit.point.kernel == 0.0 => integrate(&material.model),
             (None, Some(material)) => integrate(&hit.point.reflectance(&material.model)),
             _ => return Estimate::default(),
         };
