@@ -2,6 +2,7 @@
 //! the half vector's polar angle, finer towards the peak, by the light's polar and azimuth angle about the half vector
 //! (Rusinkiewicz 1998). Twin of `glsl/include/reflectance/merl.glsl`.
 
+use crate::reflectance::half_row::{Rows, arc};
 use crate::reflectance::{MerlError, Reflectance, clamped, packing};
 use glam::{DVec2, DVec3};
 use std::f64::consts::{FRAC_PI_2, PI};
@@ -176,6 +177,42 @@ impl MerlTable {
 impl Reflectance for MerlTable {
     fn evaluate(&self, wi: DVec3, wo: DVec3) -> DVec3 {
         if wi.z <= 0.0 || wo.z <= 0.0 { DVec3::ZERO } else { self.interpolate(Angles::of(wi, wo)) }
+    }
+
+    fn rows(&self, weights: DVec3) -> Rows<'_> {
+        let values: Vec<f32> = self.values.iter().map(|&v| weights.dot(vector(v)) as f32).collect();
+        Box::new(move |row, out| {
+            let [sine, cosine] = row.polar;
+            let (h0, h1, h) = clamped((sine.atan2(cosine) / FRAC_PI_2).sqrt(), THETA_HALF);
+            let [first, second] = [h0, h1].map(|i| values.get(i * SLICE..(i + 1) * SLICE).unwrap_or_default());
+            let mut places = [[0.0; 64]; 2];
+            for (chunk, out) in out.chunks_mut(64).enumerate() {
+                let at = 64 * chunk;
+                for i in 0..out.len() {
+                    // The viewer in the frame of the half vector: (-x, -y, cosine).
+                    let x = row.wo.z * sine - row.wo.x * row.azimuths[0][at + i] * cosine;
+                    let y = row.wo.x * row.azimuths[1][at + i];
+                    places[0][i] = arc((x * x + y * y).sqrt(), row.cosines[at + i]);
+                    places[1][i] = arc(y, x);
+                }
+                for ((value, theta), phi) in out.iter_mut().zip(places[0]).zip(places[1]) {
+                    let (d0, d1, d) = clamped(theta / FRAC_PI_2, THETA_DIFF);
+                    // From half a bin before the first centre to half a bin behind the last.
+                    let p = phi / PI * PHI_DIFF as f64 + 0.5;
+                    let p1 = p as usize;
+                    let p = p - p1 as f64;
+                    let p0 = p1.checked_sub(1).unwrap_or(PHI_DIFF - 1);
+                    let p1 = if p1 == PHI_DIFF { 0 } else { p1 };
+                    let along = |d: usize, p: usize| {
+                        let at = d * PHI_DIFF + p;
+                        let (a, b) = (f64::from(first[at]), f64::from(second[at]));
+                        a + (b - a) * h
+                    };
+                    let across = |d| along(d, p0) + (along(d, p1) - along(d, p0)) * p;
+                    *value = across(d0) + (across(d1) - across(d0)) * d;
+                }
+            }
+        })
     }
 }
 
