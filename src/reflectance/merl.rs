@@ -185,17 +185,17 @@ impl Reflectance for MerlTable {
             let [sine, cosine] = row.polar;
             let (h0, h1, h) = clamped((sine.atan2(cosine) / FRAC_PI_2).sqrt(), THETA_HALF);
             let [first, second] = [h0, h1].map(|i| values.get(i * SLICE..(i + 1) * SLICE).unwrap_or_default());
-            let mut places = [[0.0; 64]; 2];
+            let [cos, sin] = row.azimuths;
+            let (mut thetas, mut phis) = ([0.0; 64], [0.0; 64]);
             for (chunk, out) in out.chunks_mut(64).enumerate() {
-                let at = 64 * chunk;
-                for i in 0..out.len() {
-                    // The viewer in the frame of the half vector: (-x, -y, cosine).
-                    let x = row.wo.z * sine - row.wo.x * row.azimuths[0][at + i] * cosine;
-                    let y = row.wo.x * row.azimuths[1][at + i];
-                    places[0][i] = arc((x * x + y * y).sqrt(), row.cosines[at + i]);
-                    places[1][i] = arc(y, x);
+                let columns = cos.iter().zip(sin).zip(row.cosines).skip(64 * chunk);
+                for ((theta, phi), ((cos, sin), diff)) in thetas.iter_mut().zip(&mut phis).zip(columns) {
+                    // The viewer in the frame of the half vector: (-x, -y, cosine of theta_diff).
+                    let (x, y) = (row.wo.z * sine - row.wo.x * cos * cosine, row.wo.x * sin);
+                    *theta = arc((x * x + y * y).sqrt(), *diff);
+                    *phi = arc(y, x);
                 }
-                for ((value, theta), phi) in out.iter_mut().zip(places[0]).zip(places[1]) {
+                for ((value, theta), phi) in out.iter_mut().zip(thetas).zip(phis) {
                     let (d0, d1, d) = clamped(theta / FRAC_PI_2, THETA_DIFF);
                     // From half a bin before the first centre to half a bin behind the last.
                     let p = phi / PI * PHI_DIFF as f64 + 0.5;
