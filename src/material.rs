@@ -4,6 +4,7 @@ use crate::error::{Error, Result};
 use crate::frequency::TextureBandwidth;
 use crate::frequency::environment::EPS;
 use crate::frequency::wavelet::Grid;
+use crate::reflectance::half_row::Rows;
 use crate::reflectance::{BlinnPhong, Ggx, LobeBandwidth, Model, Reflectance};
 use crate::texture::{Format, Texture};
 use glam::{DVec2, DVec3};
@@ -274,5 +275,13 @@ impl Reflectance for PointReflectance {
 
     fn mean_over_turns(&self, wi: DVec3, wo: DVec3) -> DVec3 {
         self.with(wi, wo, self.model.mean_over_turns(wi, wo))
+    }
+
+    fn rows(&self, weights: DVec3) -> Rows<'_> {
+        let (model, base) = (self.model.rows(weights * self.scale), weights.dot(self.base) / PI);
+        Box::new(move |row, out| {
+            model(row, out);
+            out.iter_mut().for_each(|value| *value += base);
+        })
     }
 }

@@ -29,10 +29,14 @@ fn covered(session: &mut Session) -> u32 {
     session.shaded().unwrap()
 }
 
-/// Milliseconds of the shade pass in frames that alternate between the sessions (A B B A …), after two warm-up frames each.
-fn interleaved(sessions: &mut [Session]) -> Vec<Vec<f64>> {
+/// Milliseconds of the shade pass.
+fn shade(session: &Session) -> f64 {
+    session.timings().and_then(|t| t.passes.iter().find(|p| p.0 == "shade").map(|p| p.1)).unwrap()
+}
+
+/// What `time` says of frames that alternate between the sessions (A B B A …), after two warm-up frames each.
+fn interleaved(sessions: &mut [Session], time: impl Fn(&Session) -> f64) -> Vec<Vec<f64>> {
     let mut times = vec![Vec::new(); sessions.len()];
-    let shade = |s: &Session| s.timings().and_then(|t| t.passes.iter().find(|p| p.0 == "shade").map(|p| p.1)).unwrap();
     for round in 0..ROUNDS + 2 {
         let count = sessions.len();
         for i in 0..count {
@@ -40,7 +44,7 @@ fn interleaved(sessions: &mut [Session]) -> Vec<Vec<f64>> {
             // A frame's times arrive when the next one is recorded, before it runs.
             sessions[i].frame([0, round as u32]).unwrap();
             if round >= 2 {
-                times[i].push(shade(&sessions[i]));
+                times[i].push(time(&sessions[i]));
             }
         }
     }
@@ -54,7 +58,7 @@ fn directions_a_second_against_look_ups_only() {
     let mut sessions = [Estimator::Lookup, Estimator::Mis, Estimator::Brdf].map(|e| session(&world, e, 64, 512));
     println!("device: {}", sessions[0].headless().info().name);
     let directions = f64::from(covered(&mut sessions[0])) * 64.0;
-    let rates: Vec<_> = interleaved(&mut sessions)
+    let rates: Vec<_> = interleaved(&mut sessions, shade)
         .into_iter()
         .map(|times| {
             let q = Quantiles::of(times);
@@ -84,7 +88,7 @@ fn cost_is_linear_in_directions_and_pixels() {
         let mut sessions = cases.map(|(n, size)| session(&world, Estimator::Mis, n, size));
         let counts: Vec<f64> = sessions.iter_mut().map(|s| f64::from(covered(s))).collect();
         println!("{label}: directions, covered pixels, shade ms, ns a direction");
-        let costs: Vec<f64> = interleaved(&mut sessions)
+        let costs: Vec<f64> = interleaved(&mut sessions, shade)
             .into_iter()
             .zip(cases.iter().zip(&counts))
             .map(|(times, (&(n, _), &pixels))| {
@@ -97,4 +101,27 @@ fn cost_is_linear_in_directions_and_pixels() {
         let (least, most) = costs[1..].iter().fold((f64::MAX, 0.0f64), |(a, b), &c| (a.min(c), b.max(c)));
         assert!(most < 1.25 * least, "{label}: {costs:?}");
     }
+}
+
+#[test]
+#[ignore = "needs a quiet machine"]
+fn sixty_four_materials_against_one() {
+    let crowd = Scene::load("crowd", &[]).unwrap().resolve().unwrap();
+    assert_eq!((crowd.materials.len(), crowd.objects.len()), (64, 256));
+    // One material of each kind, on all objects.
+    let alone = ["m1", "m11", "m37", "m55"].map(|name| {
+        let mut world = crowd.clone();
+        world.materials.retain(|m| m.name == name);
+        world.objects.iter_mut().for_each(|o| o.material = 0);
+        assert_eq!(world.materials.len(), 1);
+        world
+    });
+    let mut sessions: Vec<_> = std::iter::once(&crowd).chain(&alone).map(|w| session(w, Estimator::Mis, 64, 512)).collect();
+    let frame = |s: &Session| s.timings().map(|t| t.span_ms).unwrap();
+    let times: Vec<_> = interleaved(&mut sessions, frame).into_iter().map(|t| Quantiles::of(t).median).collect();
+    println!("64 materials: {:.1} ms; one table, GGX, Blinn-Phong, vMF: {:.1?} ms", times[0], &times[1..]);
+    // The crowd has 9, 24, 16 and 15 of them.
+    let mean = times[1..].iter().zip([9.0, 24.0, 16.0, 15.0]).map(|(t, n)| t * n / 64.0).sum::<f64>();
+    println!("64 materials take {:.2} times what one takes, over their kinds", times[0] / mean);
+    assert!(times[0] <= 1.3 * mean, "{times:.1?}");
 }

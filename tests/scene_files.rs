@@ -420,7 +420,7 @@ fn builtin_scenes_resolve() {
     let names = Scene::builtin_names();
     assert_eq!(
         names.iter().map(|n| n.0).collect::<Vec<_>>(),
-        ["trio", "sphere", "bumpy-sphere", "torus-knot", "maps", "furnace"]
+        ["trio", "sphere", "bumpy-sphere", "torus-knot", "crowd", "maps", "furnace"]
     );
     for (name, line) in names {
         assert!(line.len() > 20 && line.ends_with('.'), "{name}: {line}");

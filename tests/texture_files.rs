@@ -77,6 +77,12 @@ fn colours_of_every_kind_of_file_agree() {
             assert!(off < bound, "{name} {i}: {off}");
         }
     }
+    let below: Vec<_> = colours().iter().map(|t| t.map(|c| c - 0.5)).collect();
+    write_exr(&at("below.exr"), &linear(&below)).unwrap();
+    let texture = Image::read(&at("below.exr")).unwrap().colour().unwrap();
+    for (i, want) in below.iter().enumerate() {
+        assert!((texel(&texture, i) - DVec3::from(*want).max(DVec3::ZERO)).abs().max_element() < 5e-4, "{i}");
+    }
 }
 
 #[test]

@@ -1,10 +1,11 @@
 //! One row a loader: the file that it reads, and what must hold of the result.
 
-use passband::glam::DVec3;
+use passband::glam::{DVec2, DVec3};
 use passband::offline::error::Result;
 use passband::offline::image_io::{read_exr, read_hdr, read_png};
 use passband::offline::mesh::{self, Mesh, Projection};
 use passband::offline::scene::{Scene, read_rgl, read_sgd};
+use passband::offline::texture::{Encoding, Image};
 use passband::offline::{environment, gltf};
 use passband::reflectance::{MerlTable, Reflectance};
 use std::path::Path;
@@ -28,6 +29,8 @@ pub struct Loader {
 const MESH: usize = 1 << 10;
 /// Deflate's best ratio, times what a sample becomes on its way to floats.
 const IMAGE: usize = 1032 * 16;
+/// A bit of a PNG as a texel of three bytes, and beside it a float of each channel and the finished texture with its mips.
+const TEXTURE: usize = 1032 * 8 * 24;
 /// The most that gzip may unpack to, as a mesh.
 const GZIP: usize = 64 * MESH;
 
@@ -41,19 +44,24 @@ pub const LOADERS: [Loader; 13] = [
     row("sgd", "m.csv", 256, |path, data| {
         let _ = check(write(path, data).and_then(|()| read_sgd(path, "paint")));
     }),
-    row("exr", "m.exr", IMAGE, |path, data| {
+    row("exr", "m.exr", TEXTURE, |path, data| {
         let _ = check(write(path, data).and_then(|()| read_exr(path)));
         let _ = check(environment::read(path));
+        texture(path);
     }),
-    row("hdr", "m.hdr", IMAGE, |path, data| {
+    row("hdr", "m.hdr", TEXTURE, |path, data| {
         let _ = check(write(path, data).and_then(|()| read_hdr(path)));
         let _ = check(environment::read(path));
+        texture(path);
     }),
-    row("png", "m.png", IMAGE, |path, data| {
+    row("png", "m.png", TEXTURE, |path, data| {
         let _ = check(write(path, data).and_then(|()| read_png(path)));
+        texture(path);
     }),
-    // A JPEG comes as the image of a glTF material.
-    Loader { prepare: |folder| put(&folder.join("m.gltf"), IMAGED), ..row("jpg", "image.jpg", IMAGE, image) },
+    row("jpg", "m.jpg", TEXTURE, |path, data| {
+        put(path, data);
+        texture(path);
+    }),
     row("obj", "m.obj", MESH, one_mesh),
     row("ply", "m.ply", MESH, one_mesh),
     row("off", "m.off", MESH, |path, data| {
@@ -74,11 +82,8 @@ pub const LOADERS: [Loader; 13] = [
     row("scene", "m.toml", 1 << 14, scene),
 ];
 
-/// A triangle with one material, whose colours are in `image.jpg`.
-const IMAGED: &[u8] = br#"{"asset":{"version":"2.0"},"nodes":[{"mesh":0}],"meshes":[{"primitives":[{"attributes":{"POSITION":0},
-"material":0}]}],"accessors":[{"bufferView":0,"count":3,"type":"VEC3","componentType":5126,"min":[0,0,0],"max":[1,1,0]}],
-"bufferViews":[{"buffer":0,"byteLength":36}],"buffers":[{"byteLength":36,"uri":"data:application/octet-stream;base64,AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAA"}],
-"materials":[{"pbrMetallicRoughness":{"baseColorTexture":{"index":0}}}],"textures":[{"source":0}],"images":[{"uri":"image.jpg"}]}"#;
+/// Texels of the largest image of which all textures are made: larger ones take the same path, and longer.
+const MOST_TEXELS: u32 = 1 << 14;
 
 /// The harness's own files must not fail.
 fn put(path: &Path, data: &[u8]) {
@@ -122,10 +127,20 @@ fn one_mesh(path: &Path, data: &[u8]) {
     }
 }
 
-fn image(path: &Path, data: &[u8]) {
-    put(path, data);
-    let model = check(gltf::read(&path.with_file_name("m.gltf")));
-    assert!(model.is_none_or(|m| m.materials[0].base_color_texture.is_some()));
+/// The file as every kind of map.
+fn texture(path: &Path) {
+    let Some(image) = check(Image::read(path)) else { return };
+    let [width, height] = image.size();
+    assert!((1..=16_384).contains(&width) && (1..=16_384).contains(&height));
+    if width * height > MOST_TEXELS {
+        return;
+    }
+    let textures = [Encoding::Auto, Encoding::Unit, Encoding::Signed].map(|encoding| image.normals(encoding, false, 2.0));
+    for texture in textures.into_iter().chain([image.colour(), image.roughness()]) {
+        let value = check(texture).map(|t| (t.size(), t.sample(DVec2::new(0.3, -7.1), 1.5)));
+        assert!(value.is_none_or(|(size, v)| size == [width, height] && v.is_finite()), "{value:?}");
+    }
+    let _ = check(image.heights());
 }
 
 static TABLE: Mutex<Vec<u8>> = Mutex::new(Vec::new());

@@ -3,6 +3,7 @@
 
 pub mod aov;
 pub mod builtin;
+mod cache;
 pub mod environment;
 pub mod error;
 pub mod gltf;

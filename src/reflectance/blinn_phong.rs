@@ -2,6 +2,7 @@
 //! microfacet normals. Twin of `glsl/include/blinn_phong.glsl`.
 
 use crate::error::{Error, Result};
+use crate::reflectance::half_row::Rows;
 use crate::reflectance::{Reflectance, cavity};
 use glam::DVec3;
 use std::f64::consts::PI;
@@ -53,5 +54,13 @@ impl Reflectance for BlinnPhong {
         }
         let h = (wi + wo).normalize();
         self.specular * (self.distribution(h) * cavity::masking(wi, wo, h)) + self.albedo / PI
+    }
+
+    fn rows(&self, weights: DVec3) -> Rows<'_> {
+        let (specular, base) = (weights.dot(self.specular), weights.dot(self.albedo) / PI);
+        Box::new(move |row, out| {
+            cavity::mask(row, specular * self.distribution(row.half(0)), out);
+            out.iter_mut().for_each(|value| *value += base);
+        })
     }
 }

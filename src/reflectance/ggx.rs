@@ -3,6 +3,7 @@
 
 use crate::error::{Error, Result};
 use crate::reflectance::Reflectance;
+use crate::reflectance::half_row::Rows;
 use glam::DVec3;
 use std::f64::consts::PI;
 
@@ -45,6 +46,19 @@ impl Reflectance for Ggx {
         let fresnel = schlick(self.f0, wi.dot(h));
         let specular = distribution(self.alpha, h) * masking(self.alpha, wi.z) * masking(self.alpha, wo.z);
         fresnel * specular + self.albedo * (DVec3::ONE - fresnel) / PI
+    }
+
+    fn rows(&self, weights: DVec3) -> Rows<'_> {
+        // Schlick's term and what it leaves to the base are linear in the power.
+        let (normal, edge) = (weights.dot(self.f0), weights.dot(DVec3::ONE - self.f0));
+        let base = weights.dot(self.albedo * (DVec3::ONE - self.f0)) / PI;
+        Box::new(move |row, out| {
+            let shape = distribution(self.alpha, row.half(0)) * masking(self.alpha, row.wo.z);
+            for ((value, cosine), light) in out.iter_mut().zip(row.cosines).zip(row.lights) {
+                let power = (1.0 - cosine).max(0.0).powi(5);
+                *value = (normal + edge * power) * shape * masking(self.alpha, *light) + base * (1.0 - power);
+            }
+        })
     }
 }
 

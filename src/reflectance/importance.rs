@@ -6,8 +6,9 @@
 //! reflectance's mean over turns about the normal, which is the reflectance itself if it is isotropic; so the azimuth's sign
 //! is a coin toss and they cover [0, pi].
 
+use crate::reflectance::half_row::{HalfRow, Rows};
 use crate::reflectance::{Reflectance, clamped};
-use crate::sampling::luminance;
+use crate::sampling::LUMINANCE;
 use glam::DVec3;
 use std::f64::consts::{FRAC_PI_2, PI};
 
@@ -59,10 +60,11 @@ impl ImportanceTable {
     pub fn build(reflectance: &dyn Reflectance) -> Self {
         let mut table = Self { cells: Vec::new(), density: Vec::new() };
         let grid = FineGrid::new();
-        let mut before = grid.target(reflectance, 1.0);
+        let rows = reflectance.rows(LUMINANCE);
+        let mut before = grid.target(&rows, 1.0);
         for node in 0..VIEW_ANGLES {
             let theta = FRAC_PI_2 * (node + 1) as f64 / VIEW_ANGLES as f64;
-            let after = grid.target(reflectance, theta.cos().max(GRAZING));
+            let after = grid.target(&rows, theta.cos().max(GRAZING));
             let target: Vec<f64> = before.iter().zip(&after).map(|(a, b)| (a + b) / 2.0).collect();
             grid.cut(&target, &mut table.cells);
             grid.resample(&target, &mut table.density);
@@ -173,8 +175,10 @@ struct FineGrid {
     t: Vec<f64>,
     /// Borders of the columns in the azimuth.
     phi: Vec<f64>,
-    /// Unit half vectors at the centres.
-    h: Vec<DVec3>,
+    /// Sine and cosine of the polar angle at the rows' centres.
+    polar: Vec<[f64; 2]>,
+    /// Cosine and sine of the azimuth at the columns' centres.
+    azimuths: [[f64; FINE_COLUMNS]; 2],
 }
 
 impl FineGrid {
@@ -182,15 +186,16 @@ impl FineGrid {
         // 1 - cos(theta) without cancellation near the normal.
         let t = |row: f64| 2.0 * (FRAC_PI_2 * (row / FINE_ROWS as f64).powi(2) / 2.0).sin().powi(2);
         let phi = |column: f64| PI * column / FINE_COLUMNS as f64;
-        let centre = |i: usize| {
-            let (t, phi) = (t((i / FINE_COLUMNS) as f64 + 0.5), phi((i % FINE_COLUMNS) as f64 + 0.5));
-            let sine = (t * (2.0 - t)).sqrt();
-            DVec3::new(sine * phi.cos(), sine * phi.sin(), 1.0 - t)
+        let polar = |row: usize| {
+            let t = t(row as f64 + 0.5);
+            [(t * (2.0 - t)).sqrt(), 1.0 - t]
         };
+        let azimuth = |column: usize| phi(column as f64 + 0.5);
         Self {
             t: (0..=FINE_ROWS).map(|row| if row == FINE_ROWS { 1.0 } else { t(row as f64) }).collect(),
             phi: (0..=FINE_COLUMNS).map(|column| phi(column as f64)).collect(),
-            h: (0..FINE_ROWS * FINE_COLUMNS).map(centre).collect(),
+            polar: (0..FINE_ROWS).map(polar).collect(),
+            azimuths: [std::array::from_fn(|i| azimuth(i).cos()), std::array::from_fn(|i| azimuth(i).sin())],
         }
     }
 
@@ -201,23 +206,33 @@ impl FineGrid {
 
     /// The density of half vectors to aim for, per steradian: the reflected luminance, a cosine lobe and the floor. The first
     /// two are densities of the light's direction times 4 (o.h), which takes them to half vectors (Walter et al. 2007, equation 14).
-    fn target(&self, reflectance: &dyn Reflectance, cos_o: f64) -> Vec<f64> {
+    fn target(&self, rows: &Rows<'_>, cos_o: f64) -> Vec<f64> {
         let wo = viewer(cos_o);
-        let light = |h: DVec3| {
-            let cosine = wo.dot(h);
-            let wi = 2.0 * cosine * h - wo;
-            (cosine > 0.0 && wi.z > 0.0).then_some((wi, 4.0 * cosine * wi.z))
-        };
-        let mut reflected: Vec<f64> = self
-            .h
-            .iter()
-            .map(|&h| light(h).map_or(0.0, |(wi, jacobian)| luminance(reflectance.mean_over_turns(wi, wo)) * jacobian))
-            .collect();
-        reflected.iter_mut().filter(|f| !(f.is_finite() && **f > 0.0)).for_each(|f| *f = 0.0);
+        let mut reflected = vec![0.0; FINE_ROWS * FINE_COLUMNS];
+        let mut defensive = reflected.clone();
+        let lines = reflected.as_chunks_mut::<FINE_COLUMNS>().0.iter_mut().zip(defensive.as_chunks_mut::<FINE_COLUMNS>().0);
+        for (&polar @ [sine, cosine], (reflected, defensive)) in self.polar.iter().zip(lines) {
+            let cosines: [f64; FINE_COLUMNS] = self.azimuths[0].map(|x| wo.x * sine * x + wo.z * cosine);
+            let lights = cosines.map(|c| 2.0 * c * cosine - wo.z);
+            // Both fall with the azimuth: light comes from above the horizon in the first columns.
+            let lit = cosines.iter().zip(&lights).take_while(|(c, light)| **c > 0.0 && **light > 0.0).count();
+            if lit == 0 {
+                continue;
+            }
+            let [cosines, lights] = [&cosines[..lit], &lights[..lit]];
+            let azimuths = self.azimuths.each_ref().map(|a| &a[..lit]);
+            rows(&HalfRow { wo, polar, azimuths, cosines, lights }, &mut reflected[..lit]);
+            for (((f, d), c), light) in reflected.iter_mut().zip(defensive).zip(cosines).zip(lights) {
+                let jacobian = 4.0 * c * light;
+                let value = *f * jacobian;
+                *f = if value > 0.0 && value < f64::INFINITY { value } else { 0.0 };
+                *d = (1.0 - REFLECTANCE_SHARE) / PI * jacobian;
+            }
+        }
         let integral = self.integral(&reflected);
         let scale = if integral.is_normal() { REFLECTANCE_SHARE / integral } else { 0.0 };
-        let defensive = |h| light(h).map_or(0.0, |(_, jacobian)| (1.0 - REFLECTANCE_SHARE) / PI * jacobian);
-        let mut target: Vec<f64> = reflected.iter().zip(&self.h).map(|(f, &h)| f * scale + defensive(h) + FLOOR).collect();
+        let mut target = reflected;
+        target.iter_mut().zip(defensive).for_each(|(f, d)| *f = *f * scale + d + FLOOR);
         let integral = self.integral(&target);
         target.iter_mut().for_each(|f| *f /= integral);
         target
@@ -225,7 +240,8 @@ impl FineGrid {
 
     /// The integral over both signs of the azimuth.
     fn integral(&self, values: &[f64]) -> f64 {
-        values.iter().enumerate().map(|(i, f)| 2.0 * f * self.solid_angle(i / FINE_COLUMNS)).sum()
+        let rows = values.as_chunks::<FINE_COLUMNS>().0.iter().enumerate();
+        rows.map(|(r, f)| 2.0 * f.iter().sum::<f64>() * self.solid_angle(r)).sum()
     }
 
     /// Appends one node's cells: strips of equal mass in t, each cut into intervals of equal mass in the azimuth.

@@ -2,6 +2,7 @@
 //! the half vector's polar angle, finer towards the peak, by the light's polar and azimuth angle about the half vector
 //! (Rusinkiewicz 1998). Twin of `glsl/include/reflectance/merl.glsl`.
 
+use crate::reflectance::half_row::{Rows, arc};
 use crate::reflectance::{MerlError, Reflectance, clamped, packing};
 use glam::{DVec2, DVec3};
 use std::f64::consts::{FRAC_PI_2, PI};
@@ -176,6 +177,42 @@ impl MerlTable {
 impl Reflectance for MerlTable {
     fn evaluate(&self, wi: DVec3, wo: DVec3) -> DVec3 {
         if wi.z <= 0.0 || wo.z <= 0.0 { DVec3::ZERO } else { self.interpolate(Angles::of(wi, wo)) }
+    }
+
+    fn rows(&self, weights: DVec3) -> Rows<'_> {
+        let values: Vec<f32> = self.values.iter().map(|&v| weights.dot(vector(v)) as f32).collect();
+        Box::new(move |row, out| {
+            let [sine, cosine] = row.polar;
+            let (h0, h1, h) = clamped((sine.atan2(cosine) / FRAC_PI_2).sqrt(), THETA_HALF);
+            let [first, second] = [h0, h1].map(|i| values.get(i * SLICE..(i + 1) * SLICE).unwrap_or_default());
+            let [cos, sin] = row.azimuths;
+            let (mut thetas, mut phis) = ([0.0; 64], [0.0; 64]);
+            for (chunk, out) in out.chunks_mut(64).enumerate() {
+                let columns = cos.iter().zip(sin).zip(row.cosines).skip(64 * chunk);
+                for ((theta, phi), ((cos, sin), diff)) in thetas.iter_mut().zip(&mut phis).zip(columns) {
+                    // The viewer in the frame of the half vector: (-x, -y, cosine of theta_diff).
+                    let (x, y) = (row.wo.z * sine - row.wo.x * cos * cosine, row.wo.x * sin);
+                    *theta = arc((x * x + y * y).sqrt(), *diff);
+                    *phi = arc(y, x);
+                }
+                for ((value, theta), phi) in out.iter_mut().zip(thetas).zip(phis) {
+                    let (d0, d1, d) = clamped(theta / FRAC_PI_2, THETA_DIFF);
+                    // From half a bin before the first centre to half a bin behind the last.
+                    let p = phi / PI * PHI_DIFF as f64 + 0.5;
+                    let p1 = p as usize;
+                    let p = p - p1 as f64;
+                    let p0 = p1.checked_sub(1).unwrap_or(PHI_DIFF - 1);
+                    let p1 = if p1 == PHI_DIFF { 0 } else { p1 };
+                    let along = |d: usize, p: usize| {
+                        let at = d * PHI_DIFF + p;
+                        let (a, b) = (f64::from(first[at]), f64::from(second[at]));
+                        a + (b - a) * h
+                    };
+                    let across = |d| along(d, p0) + (along(d, p1) - along(d, p0)) * p;
+                    *value = across(d0) + (across(d1) - across(d0)) * d;
+                }
+            }
+        })
     }
 }
 

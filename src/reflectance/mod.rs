@@ -4,6 +4,7 @@
 //! ([`Reflectance::isotropic`]) wants directions in the surface's tangent frame.
 
 use glam::{DVec2, DVec3};
+use half_row::Rows;
 use std::sync::Arc;
 
 pub mod analysis;
@@ -13,6 +14,7 @@ pub mod blinn_phong;
 mod cavity;
 pub mod frame;
 pub mod ggx;
+pub mod half_row;
 pub mod importance;
 pub(crate) mod ladder;
 pub mod merl;
@@ -73,6 +75,11 @@ pub trait Reflectance: Send + Sync {
     fn mean_over_turns(&self, wi: DVec3, wo: DVec3) -> DVec3 {
         self.evaluate(wi, wo)
     }
+
+    /// [`Self::mean_over_turns`] dotted with `weights`, prepared for many rows of half vectors; the same up to rounding.
+    fn rows(&self, weights: DVec3) -> Rows<'_> {
+        half_row::one_by_one(self, weights)
+    }
 }
 
 /// The reflectances that the renderer shades.
@@ -114,6 +121,10 @@ impl Reflectance for Model {
     fn mean_over_turns(&self, wi: DVec3, wo: DVec3) -> DVec3 {
         self.inner().mean_over_turns(wi, wo)
     }
+
+    fn rows(&self, weights: DVec3) -> Rows<'_> {
+        self.inner().rows(weights)
+    }
 }
 
 /// `v` turned about the normal by the angle whose cosine and sine `turn` holds.
@@ -124,5 +135,6 @@ pub fn turned(turn: DVec2, v: DVec3) -> DVec3 {
 /// The neighbours and the weight of the second at `unit` of an axis of `bins` over [0, 1]: linear between bin centres.
 fn clamped(unit: f64, bins: usize) -> (usize, usize, f64) {
     let x = (unit * bins as f64 - 0.5).clamp(0.0, (bins - 1) as f64);
-    (x as usize, (x as usize + 1).min(bins - 1), x.fract())
+    let first = x as usize;
+    (first, (first + 1).min(bins - 1), x - first as f64)
 }

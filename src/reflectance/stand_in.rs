@@ -108,7 +108,8 @@ pub fn names() -> &'static [&'static str] {
 /// Bakes the synthetic table of that name, or `None` if there is no such stand-in.
 pub fn table(name: &str) -> Option<MerlTable> {
     let material = ALL.iter().find(|s| s.name == name)?;
-    Some(MerlTable::from_fn(|theta_half, theta_diff, phi_diff| material.evaluate(Angles { theta_half, theta_diff, phi_diff })))
+    let value = |theta_half, theta_diff, phi_diff| material.evaluate(Angles { theta_half, theta_diff, phi_diff });
+    Some(MerlTable::from_fn_parallel(value))
 }
 
 impl Lobe {

@@ -3,6 +3,7 @@
 //! holds. Twin of `material_evaluate` in `glsl/bridge/materials.glsl`.
 
 use crate::error::{Error, Result};
+use crate::reflectance::half_row::Rows;
 use crate::reflectance::{MerlTable, Reflectance};
 use glam::DVec3;
 use std::f64::consts::TAU;
@@ -68,5 +69,9 @@ impl Reflectance for TurnedTables {
     /// The mean of a piecewise linear function is that of its nodes.
     fn mean_over_turns(&self, wi: DVec3, wo: DVec3) -> DVec3 {
         self.mean.evaluate(wi, wo)
+    }
+
+    fn rows(&self, weights: DVec3) -> Rows<'_> {
+        self.mean.rows(weights)
     }
 }

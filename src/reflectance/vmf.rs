@@ -2,6 +2,7 @@
 //! equations 6 and 14). Twin of `glsl/include/vmf.glsl`.
 
 use crate::error::{Error, Result};
+use crate::reflectance::half_row::Rows;
 use crate::reflectance::{Reflectance, cavity};
 use glam::DVec3;
 use std::f64::consts::PI;
@@ -146,6 +147,11 @@ impl Reflectance for Vmf {
 
     fn mean_over_turns(&self, wi: DVec3, wo: DVec3) -> DVec3 {
         self.evaluate_with(wi, wo, |h| self.ring(h))
+    }
+
+    fn rows(&self, weights: DVec3) -> Rows<'_> {
+        let weight = weights.element_sum();
+        Box::new(move |row, out| cavity::mask(row, weight * self.ring(row.half(0)), out))
     }
 }
 

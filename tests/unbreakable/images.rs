@@ -14,12 +14,12 @@ fn image(what: &str, name: &str, bytes: impl Into<Vec<u8>>, says: &str) -> Row {
 }
 
 /// An HDR without its pixels.
-fn hdr(header: &str, size: &str) -> Vec<u8> {
+pub fn hdr(header: &str, size: &str) -> Vec<u8> {
     format!("#?RADIANCE\n{header}FORMAT=32-bit_rle_rgbe\n\n{size}\n").into_bytes()
 }
 
 /// A PNG whose header claims a size.
-fn png_of([width, height]: [u32; 2]) -> Vec<u8> {
+pub fn png_of([width, height]: [u32; 2]) -> Vec<u8> {
     let mut bytes = patched("png/rgba8.png", 16, &[width.to_be_bytes(), height.to_be_bytes()].concat());
     let mut crc = flate2::Crc::new();
     crc.update(&bytes[12..29]);
@@ -28,13 +28,13 @@ fn png_of([width, height]: [u32; 2]) -> Vec<u8> {
 }
 
 /// A whole PNG of black pixels.
-fn black_png(width: u32, height: u32) -> Vec<u8> {
+pub fn black_png(width: u32, height: u32) -> Vec<u8> {
     let mut file = std::io::Cursor::new(Vec::new());
     image::DynamicImage::new_luma8(width, height).write_to(&mut file, image::ImageFormat::Png).unwrap();
     file.into_inner()
 }
 
-fn exr(width: usize, height: usize, value: f32) -> Vec<u8> {
+pub fn exr(width: usize, height: usize, value: f32) -> Vec<u8> {
     use exr::prelude::*;
     let mut file = std::io::Cursor::new(Vec::new());
     let channels = SpecificChannels::rgb(|_: Vec2<usize>| (value, value, value));
@@ -101,7 +101,7 @@ pub fn rows() -> Vec<Row> {
     ]
 }
 
-fn exr_named(channel: &str) -> Vec<u8> {
+pub fn exr_named(channel: &str) -> Vec<u8> {
     use exr::prelude::*;
     let mut file = std::io::Cursor::new(Vec::new());
     let list = AnyChannels::sort([AnyChannel::new(channel, FlatSamples::F32(vec![1.0; 8]))].into_iter().collect());

@@ -11,6 +11,7 @@ mod meshes;
 mod run;
 mod scenes;
 mod seeds;
+mod textures;
 
 #[path = "../support/damage.rs"]
 mod damage;
@@ -43,7 +44,7 @@ fn check(test: &str, rows: &[Row]) -> Vec<i32> {
 
 #[test]
 fn every_row_ends_as_it_should() {
-    let tables = [meshes::rows(), images::rows(), materials::rows(), scenes::rows(), machine::rows()];
+    let tables = [meshes::rows(), images::rows(), materials::rows(), textures::rows(), scenes::rows(), machine::rows()];
     check("table", &tables.into_iter().flatten().collect::<Vec<_>>());
 }
 

@@ -2,6 +2,7 @@
 
 use crate::run::Row;
 use crate::seeds::{GREY, edited, made_of, seed, shows, under};
+use crate::textures::mapped;
 
 /// A scene with one thing changed.
 fn scene(what: &str, from: &str, to: &str, says: &str) -> Row {
@@ -28,6 +29,10 @@ pub fn rows() -> Vec<Row> {
         text("no objects", format!("[camera]\nposition = [0, 0, 1]\n{GREY}"), "objects"),
         scene("an unknown key", "fov_y", "fov_z", ":5: "),
         scene("a number of another kind", "fov_y = 40", "fov_y = '40'", ":5: camera.fov_y"),
+        scene("a position in four dimensions", "[0, 1, 5]", "[0, 1, 5, 9]", ":2: camera.position: expected 3 numbers"),
+        scene("a colour of four channels", "[0.04, 0.5, 1]", "[0.04, 0.5, 1, 1]", "expected a number or three numbers"),
+        scene("a size in three directions", "[32, 24]", "[32, 24, 1]", ":6: camera.size: expected 2 numbers"),
+        scene("a matrix of 17", "5, 0, 0, 1]", "5, 0, 0, 1, 0]", ":17: objects.1.transform: expected 16 numbers"),
         scene("NaN", "fov_y = 40", "fov_y = nan", ":5: camera.fov_y: expected 0 < degrees < 180, got NaN"),
         scene("infinity", "[0, 1, 5]", "[0, inf, 5]", ":2: camera.position: expected three finite numbers"),
         scene("a position beyond single precision", "[0, 1, 5]", "[0, 1e300, 5]", ":2: camera.position"),
@@ -60,7 +65,7 @@ pub fn rows() -> Vec<Row> {
             .says(&["--set camera.position"]),
     ];
     // Every kind of file that a scene or a command can name.
-    let named: [(&str, &str, String); 9] = [
+    let named: [(&str, &str, String); 13] = [
         ("m.obj", "render s.toml", shows("m.obj")),
         ("m.off.gz", "render s.toml", shows("m.off.gz")),
         ("m.glb", "render s.toml", shows("m.glb")),
@@ -70,6 +75,10 @@ pub fn rows() -> Vec<Row> {
         ("m.bsdf", "render s.toml", made_of("rgl = 'm.bsdf'")),
         ("m.csv", "render s.toml", made_of("sgd = { table = 'm.csv', name = 'x' }")),
         ("m.png", "compare m.png m.png", String::new()),
+        ("t.png", "render s.toml", mapped("albedo_map", "t.png")),
+        ("t.jpg", "render s.toml", mapped("roughness_map", "t.jpg")),
+        ("t.exr", "render s.toml", mapped("normal_map", "t.exr")),
+        ("t.hdr", "render s.toml", mapped("height_map", "t.hdr")),
     ];
     for (name, command, scene) in named {
         let row = |what: &str, says: &str| {

@@ -1,13 +1,12 @@
 //! Atlases through `uvunwrap`, kept on disk by the content of the mesh.
 //!
-//! A cache entry is: the SHA-256 of what follows; two little-endian 32-bit counts of vertices and indices; for every vertex
+//! A cache entry's content: two little-endian 32-bit counts of vertices and indices; for every vertex
 //! the index of the one that it copies and its two coordinates; the indices.
 
+use crate::offline::cache;
 use crate::offline::error::{Error, Result};
-use crate::offline::image_io::write_atomically;
 use crate::offline::mesh::Mesh;
 use sha2::{Digest, Sha256};
-use std::io::Write;
 use std::path::{Path, PathBuf};
 use uvunwrap::{Density, MeshInput, Options, Packing};
 
@@ -19,7 +18,7 @@ const PAGE_SIZES: [u32; 3] = [1024, 4096, 16_384];
 
 /// The folder of the user's cache in which atlases are kept; `None` on systems that have none.
 pub fn cache_folder() -> Option<PathBuf> {
-    dirs::cache_dir().map(|folder| folder.join("passband").join("atlas"))
+    cache::folder("atlas")
 }
 
 /// A mesh's new vertices and triangles.
@@ -33,13 +32,13 @@ struct Unwrapped {
 /// `mesh` with the coordinates of an atlas.
 pub(super) fn unwrap(mesh: &Mesh, cache: Option<&Path>) -> Result<Mesh> {
     let entry = cache.map(|folder| folder.join(format!("{}.atlas", key(mesh))));
-    let known = entry.as_ref().and_then(|entry| Unwrapped::from_bytes(&std::fs::read(entry).ok()?, mesh));
+    let known = entry.as_ref().and_then(|entry| Unwrapped::from_bytes(&cache::read(entry)?, mesh));
     let unwrapped = match known {
         Some(unwrapped) => unwrapped,
         None => {
             let unwrapped = compute(mesh)?;
             if let Some(entry) = &entry {
-                keep(entry, &unwrapped);
+                cache::keep(entry, &unwrapped.to_bytes());
             }
             unwrapped
         }
@@ -72,19 +71,6 @@ fn compute(mesh: &Mesh) -> Result<Unwrapped> {
     Err(Error::argument("uv atlas", "charts that fit one page of 16384x16384", "more"))
 }
 
-/// Writes a cache entry if that is possible.
-fn keep(entry: &Path, unwrapped: &Unwrapped) {
-    let Some(folder) = entry.parent() else { return };
-    let written = std::fs::create_dir_all(folder).map_err(|e| e.to_string());
-    let written = written.and_then(|()| {
-        let bytes = unwrapped.to_bytes();
-        write_atomically(entry, |file| file.write_all(&bytes)).map_err(|e| e.to_string())
-    });
-    if let Err(e) = written {
-        log::warn!("the atlas is not kept: {e}");
-    }
-}
-
 /// The name of a mesh's content.
 fn key(mesh: &Mesh) -> String {
     let mut hash = Sha256::new();
@@ -100,18 +86,11 @@ impl Unwrapped {
         let counts = [self.sources.len() as u32, self.indices.len() as u32];
         let uvs = self.uvs.iter().flatten().map(|c| c.to_bits());
         let words = counts.into_iter().chain(self.sources.iter().copied()).chain(uvs).chain(self.indices.iter().copied());
-        let content: Vec<u8> = words.flat_map(u32::to_le_bytes).collect();
-        let mut bytes = Sha256::digest(&content).to_vec();
-        bytes.extend(content);
-        bytes
+        words.flat_map(u32::to_le_bytes).collect()
     }
 
-    /// Nothing unless the entry is whole and fits `mesh`.
-    fn from_bytes(bytes: &[u8], mesh: &Mesh) -> Option<Self> {
-        let (sum, content) = bytes.split_at_checked(32)?;
-        if Sha256::digest(content).as_slice() != sum {
-            return None;
-        }
+    /// Nothing unless the content fits `mesh`.
+    fn from_bytes(content: &[u8], mesh: &Mesh) -> Option<Self> {
         let words: Vec<u32> = content.as_chunks::<4>().0.iter().map(|word| u32::from_le_bytes(*word)).collect();
         let ([vertices, corners], rest) = words.split_first_chunk::<2>()?;
         let (sources, rest) = rest.split_at_checked(*vertices as usize)?;
@@ -186,25 +165,27 @@ mod tests {
     #[test]
     fn entries_are_used_and_damaged_ones_replaced() {
         let folder = tempfile::tempdir().unwrap();
-        let cache = folder.path().join("deep").join("cache");
+        let place = folder.path().join("deep").join("cache");
         let source = builtin::mesh("bumpy-sphere", 8).unwrap();
-        let fresh = unwrap(&source, Some(&cache)).unwrap();
-        let entry = cache.join(format!("{}.atlas", key(&source)));
+        let fresh = unwrap(&source, Some(&place)).unwrap();
+        let entry = place.join(format!("{}.atlas", key(&source)));
         let kept = std::fs::read(&entry).unwrap();
         // A valid entry of other content is believed: it is read, not computed.
-        let mut other = Unwrapped::from_bytes(&kept, &source).unwrap();
+        let mut other = Unwrapped::from_bytes(&cache::read(&entry).unwrap(), &source).unwrap();
         other.uvs[0] = [0.25, 0.75];
-        std::fs::write(&entry, other.to_bytes()).unwrap();
-        assert_eq!(unwrap(&source, Some(&cache)).unwrap().uvs[0], [0.25, 0.75]);
+        cache::keep(&entry, &other.to_bytes());
+        assert_eq!(unwrap(&source, Some(&place)).unwrap().uvs[0], [0.25, 0.75]);
         other.indices[0] = u32::MAX;
+        cache::keep(&entry, &other.to_bytes());
+        let unfit = std::fs::read(&entry).unwrap();
         let mut flipped = kept.clone();
         flipped[100] ^= 1;
-        for damaged in [vec![], kept[..kept.len() / 2].to_vec(), flipped, other.to_bytes(), vec![0; 40]] {
+        for damaged in [vec![], kept[..kept.len() / 2].to_vec(), flipped, unfit, vec![0; 40]] {
             std::fs::write(&entry, damaged).unwrap();
-            assert_eq!(unwrap(&source, Some(&cache)).unwrap().uvs, fresh.uvs);
+            assert_eq!(unwrap(&source, Some(&place)).unwrap().uvs, fresh.uvs);
             assert_eq!(std::fs::read(&entry).unwrap(), kept, "rewritten");
         }
-        assert_eq!(std::fs::read_dir(&cache).unwrap().count(), 1, "nothing else is left there");
+        assert_eq!(std::fs::read_dir(&place).unwrap().count(), 1, "nothing else is left there");
         // Another mesh has another name; a folder that cannot be does not matter.
         let mut moved = source.clone();
         moved.positions[0][0] += 0.001;

@@ -6,12 +6,27 @@
 //! `[[animation.objects]]` with `object = INDEX` and `keyframes = [...]`. An object whose mesh is a glTF file may leave out
 //! `material`: it then has the file's own; and `[camera]` may be left out if such a file has one.
 
-use serde::Deserialize;
+use serde::de::{Error as _, IgnoredAny, SeqAccess};
+use serde::{Deserialize, Deserializer};
 use std::collections::BTreeMap;
 use toml::Spanned;
 
 pub(super) type Key<T> = Option<Spanned<T>>;
 pub(super) type Vector = [f64; 3];
+
+/// An array of `N` and no more.
+fn exactly<'de, D: Deserializer<'de>, T: Deserialize<'de>, const N: usize>(deserializer: D) -> Result<Spanned<[T; N]>, D::Error> {
+    let all = Spanned::<Vec<T>>::deserialize(deserializer)?;
+    let (span, all) = (all.span(), all.into_inner());
+    let array = all.try_into().map_err(|all: Vec<T>| D::Error::invalid_length(all.len(), &format!("{N} numbers").as_str()))?;
+    Ok(Spanned::new(span, array))
+}
+
+fn some_exactly<'de, D: Deserializer<'de>, T: Deserialize<'de>, const N: usize>(
+    deserializer: D,
+) -> Result<Key<[T; N]>, D::Error> {
+    exactly(deserializer).map(Some)
+}
 
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -31,10 +46,14 @@ pub(super) struct SceneFile {
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Camera {
+    #[serde(deserialize_with = "exactly")]
     pub position: Spanned<Vector>,
+    #[serde(default, deserialize_with = "some_exactly")]
     pub target: Key<Vector>,
+    #[serde(default, deserialize_with = "some_exactly")]
     pub up: Key<Vector>,
     pub fov_y: Key<f64>,
+    #[serde(default, deserialize_with = "some_exactly")]
     pub size: Key<[u32; 2]>,
 }
 
@@ -53,9 +72,13 @@ pub(super) struct Environment {
 #[serde(deny_unknown_fields)]
 pub(super) struct Light {
     pub r#type: Spanned<String>,
+    #[serde(default, deserialize_with = "some_exactly")]
     pub position: Key<Vector>,
+    #[serde(default, deserialize_with = "some_exactly")]
     pub direction: Key<Vector>,
+    #[serde(default, deserialize_with = "some_exactly")]
     pub u: Key<Vector>,
+    #[serde(default, deserialize_with = "some_exactly")]
     pub v: Key<Vector>,
     pub radius: Key<f64>,
     pub intensity: Key<Triple>,
@@ -71,9 +94,12 @@ pub(super) struct Object {
     pub detail: Key<u32>,
     pub material: Key<String>,
     pub uv: Key<String>,
+    #[serde(default, deserialize_with = "some_exactly")]
     pub translate: Key<Vector>,
+    #[serde(default, deserialize_with = "some_exactly")]
     pub rotate: Key<Vector>,
     pub scale: Key<Triple>,
+    #[serde(default, deserialize_with = "some_exactly")]
     pub transform: Key<[f64; 16]>,
 }
 
@@ -89,6 +115,7 @@ pub(super) struct Material {
     pub displace: Key<bool>,
     pub roughness_map: Key<String>,
     pub roughness: Key<String>,
+    #[serde(default, deserialize_with = "some_exactly")]
     pub tiling: Key<[f64; 2]>,
     pub normal_encoding: Key<String>,
     pub normal_y: Key<String>,
@@ -167,6 +194,7 @@ pub(super) struct BlinnPhong {
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Vmf {
+    #[serde(deserialize_with = "exactly")]
     pub mu: Spanned<Vector>,
     pub kappa: Spanned<f64>,
     pub weight: Spanned<f64>,
@@ -187,8 +215,11 @@ pub(super) struct Animation {
 #[serde(deny_unknown_fields)]
 pub(super) struct CameraKey {
     pub frame: Spanned<u32>,
+    #[serde(default, deserialize_with = "some_exactly")]
     pub position: Key<Vector>,
+    #[serde(default, deserialize_with = "some_exactly")]
     pub target: Key<Vector>,
+    #[serde(default, deserialize_with = "some_exactly")]
     pub up: Key<Vector>,
     pub fov_y: Key<f64>,
 }
@@ -204,7 +235,9 @@ pub(super) struct AnimatedObject {
 #[serde(deny_unknown_fields)]
 pub(super) struct ObjectKey {
     pub frame: Spanned<u32>,
+    #[serde(default, deserialize_with = "some_exactly")]
     pub translate: Key<Vector>,
+    #[serde(default, deserialize_with = "some_exactly")]
     pub rotate: Key<Vector>,
     pub scale: Key<Triple>,
 }
@@ -256,8 +289,13 @@ impl<'de> Deserialize<'de> for Triple {
                 Ok(Triple([v as f64; 3]))
             }
 
-            fn visit_seq<A: serde::de::SeqAccess<'de>>(self, seq: A) -> Result<Triple, A::Error> {
-                Vector::deserialize(serde::de::value::SeqAccessDeserializer::new(seq)).map(Triple)
+            fn visit_seq<A: SeqAccess<'de>>(self, mut seq: A) -> Result<Triple, A::Error> {
+                let vector = Vector::deserialize(serde::de::value::SeqAccessDeserializer::new(&mut seq))?;
+                // What is left over would not be missed.
+                if seq.next_element::<IgnoredAny>()?.is_some() {
+                    return Err(A::Error::invalid_length(4, &self));
+                }
+                Ok(Triple(vector))
             }
         }
         deserializer.deserialize_any(Visitor)

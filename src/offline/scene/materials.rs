@@ -1,10 +1,10 @@
 //! Reflectances of a scene's materials: one function a kind.
 
 use crate::offline::error::{At, Error, Result};
-use crate::offline::input;
-use crate::offline::scene::Scene;
 use crate::offline::scene::format::{self, Reflectance, Triple};
 use crate::offline::scene::source::Span;
+use crate::offline::scene::{Scene, bakes};
+use crate::offline::{cache, input};
 use crate::reflectance::sgd::PARAMETERS;
 use crate::reflectance::{BlinnPhong, Ggx, Lobe, MerlTable, Model, Reflectance as _, Rgl, Sgd, Vmf, sgd_table, stand_in};
 use glam::DVec3;
@@ -76,8 +76,11 @@ pub fn read_merl(path: &Path) -> Result<MerlTable> {
 /// # Errors
 /// [`Error::File`] with the byte offset of what is wrong.
 pub fn read_rgl(path: &Path) -> Result<Rgl> {
-    let bytes = input::read(path)?;
-    Rgl::from_bytes(&bytes).map_err(|e| Error::file(path, At::Byte(e.offset), e.field, e.expected, e.got))
+    rgl_of(path, &input::read(path)?)
+}
+
+fn rgl_of(path: &Path, bytes: &[u8]) -> Result<Rgl> {
+    Rgl::from_bytes(bytes).map_err(|e| Error::file(path, At::Byte(e.offset), e.field, e.expected, e.got))
 }
 
 /// The row `name` of a CSV table of SGD parameters.
@@ -91,8 +94,13 @@ pub fn read_sgd(path: &Path, name: &str) -> Result<Sgd> {
 
 /// An RGL file as the GPU shades it: one table if it is isotropic, tables over the azimuth if not.
 fn rgl(path: &Path) -> Result<Model> {
-    let rgl = read_rgl(path)?;
-    Ok(if rgl.isotropic() { table(rgl.bake()) } else { Model::Turned(Arc::new(rgl.bake_turned()?)) })
+    let bytes = input::read(path)?;
+    let rgl = rgl_of(path, &bytes)?;
+    if rgl.isotropic() {
+        return Ok(table(rgl.bake()));
+    }
+    let tables = bakes::turned(&bytes, cache::folder("turned").as_deref(), || rgl.bake_turned())?;
+    Ok(Model::Turned(Arc::new(tables)))
 }
 
 fn sgd(scene: &Scene, keys: &Spanned<format::Sgd>) -> Result<Sgd> {

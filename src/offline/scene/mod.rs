@@ -6,6 +6,7 @@ use crate::offline::input;
 use crate::offline::world::World;
 use std::path::{Path, PathBuf};
 
+mod bakes;
 mod check;
 mod format;
 mod later;

@@ -72,7 +72,10 @@ fn pixels(path: &Path, field: &str, bytes: &[u8], decoder: impl ImageDecoder, le
     }
     let deep = matches!(decoder.color_type(), ColorType::L16 | ColorType::La16 | ColorType::Rgb16 | ColorType::Rgba16);
     let malformed = |e: ImageError| Error::file(path, At::File, field, "a well-formed PNG or JPEG image", format!("{e:.200}"));
-    let decoded = DynamicImage::from_decoder(decoder).map_err(malformed)?;
+    // The JPEG decoder panics on some malformed files.
+    let decoded = input::caught(|| DynamicImage::from_decoder(decoder));
+    let panicked = || Error::file(path, At::File, field, "a well-formed PNG or JPEG image", "one that cannot be decoded");
+    let decoded = decoded.ok_or_else(panicked)?.map_err(malformed)?;
     let samples =
         if deep { Samples::Bits16(decoded.into_rgb16().into_raw()) } else { Samples::Bits8(decoded.into_rgb8().into_raw()) };
     Ok(Image { path: path.into(), size: [width, height], samples })

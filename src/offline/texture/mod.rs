@@ -75,7 +75,7 @@ impl Image {
         self.size[0] as usize * self.size[1] as usize
     }
 
-    /// A colour texture: integer images are sRGB-encoded (8 bits stay so), floating-point ones are linear.
+    /// A colour texture: integer images are sRGB-encoded (8 bits stay so), floating-point ones are linear; below 0 counts as 0.
     ///
     /// # Errors
     /// [`Error::File`] names the texel that is not finite.
@@ -86,7 +86,12 @@ impl Image {
                 let texels: Vec<_> = (0..self.count()).map(|i| self.linear(i).to_array()).collect();
                 Texture::colour(self.size, &texels)
             }
-            Samples::Float(all) => Texture::colour(self.size, all),
+            Samples::Float(all) => {
+                // Filters leave such values behind, and light below 0 is none. What is not finite stays, to be refused.
+                let texels: Vec<_> =
+                    all.iter().map(|texel| texel.map(|c| if c < 0.0 && c.is_finite() { 0.0 } else { c })).collect();
+                Texture::colour(self.size, &texels)
+            }
         };
         made.map_err(|e| self.refused(e))
     }
