@@ -1,10 +1,12 @@
 //! The `passband` command: one file a subcommand.
 
+mod bench;
 mod compare;
 mod info;
 mod material;
 mod render;
 mod scenes;
+mod sheet;
 
 use clap::error::ErrorKind;
 use clap::{Parser, Subcommand};
@@ -23,6 +25,7 @@ struct Cli {
 
 #[derive(Subcommand)]
 enum Command {
+    Bench(Box<bench::Args>),
     Render(Box<render::Args>),
     Compare(compare::Args),
     Info(info::Args),
@@ -36,6 +39,7 @@ fn main() -> ExitCode {
         Err(error) => return usage(&error),
     };
     let result = match &cli.command {
+        Command::Bench(args) => bench::run(args),
         Command::Render(args) => render::run(args),
         Command::Compare(args) => compare::run(args),
         Command::Info(args) => info::run(args),

@@ -121,7 +121,8 @@ const FILTERS: [&str; 19] = [
     "bruteforce",
 ];
 
-fn size(text: &str) -> std::result::Result<[u32; 2], String> {
+/// WIDTHxHEIGHT of an image.
+pub fn size(text: &str) -> std::result::Result<[u32; 2], String> {
     let parse = |t: &str| t.parse::<u32>().ok().filter(|e| (1..=16384).contains(e));
     let sides = text.split_once('x').and_then(|(w, h)| Some([parse(w)?, parse(h)?]));
     sides.ok_or_else(|| format!("expected WxH of 1 to 16384 pixels a side, got {text}"))
