@@ -113,6 +113,8 @@ fn rates_are_compared_with_full_rate_beside_their_error() {
     for name in ["half 64", "quarter 256", "full brdf-random 16"] {
         let [mis] = against(name).try_into().unwrap();
         assert!(mis["estimator"] == "mis" && number(&mis["rmse"]["speed_up"]) > 0.0, "{name}: {mis}");
+        let equal = &mis["rmse"];
+        assert!(number(&equal["interval"][0]) <= number(&equal["interval"][1]), "{equal}");
         let gain = report["summary"].as_array().unwrap().iter().find(|g| g["variant"] == name && g["measure"] == "rmse").unwrap();
         assert_eq!((&gain["median"]["factor"], &gain["median"]["is"]), (&mis["rmse"]["speed_up"], &mis["rmse"]["speed_up_is"]));
     }

@@ -7,7 +7,7 @@ use passband::offline::bench::report::{Against, Gain, Report, Row, SceneReport, 
 use passband::offline::bench::statistics::{Ratio, Summary};
 
 const LEGEND: &str = "of the first's: frame time over the first variant's, with its 95 % interval
-speed-up: over full rate with mis where that has the same rmse; at PSNR: where it has the same PSNR
+speed-up: over full rate with mis where that has the same rmse, with its interval; at PSNR: where it has the same PSNR
 error: rmse over that of full rate with mis in the same time; of its own: speed-up over full rate with the same estimator
 < and > are bounds: full rate was not measured further";
 
@@ -91,6 +91,14 @@ fn bounded(value: f64, is: Is) -> String {
     format!("{sign}{value:.2}")
 }
 
+fn speed(e: &Equal) -> String {
+    bounded(e.speed_up, e.speed_up_is)
+}
+
+fn with_interval(e: &Equal) -> String {
+    format!("{} [{:.2}, {:.2}]", speed(e), e.interval[0], e.interval[1])
+}
+
 fn compared(scene: &SceneReport) -> String {
     let row = |row: &Row| {
         let error = row.error.as_ref();
@@ -99,7 +107,6 @@ fn compared(scene: &SceneReport) -> String {
             let equal = row.against.iter().find(of_mis).and_then(|a| if shown { a.psnr } else { a.rmse });
             equal.map_or(String::new(), |e| of(&e))
         };
-        let speed = |e: &Equal| bounded(e.speed_up, e.speed_up_is);
         vec![
             row.name.clone(),
             format!("{:.3}", row.shaded_fraction),
@@ -108,7 +115,7 @@ fn compared(scene: &SceneReport) -> String {
             row.over_first.as_ref().map_or(String::new(), ratio),
             error.map_or(String::new(), |e| format!("{:.3e}", e.rmse)),
             error.map_or(String::new(), |e| format!("{:.2}", e.psnr)),
-            against(false, speed, false),
+            against(false, with_interval, false),
             against(false, speed, true),
             against(false, |e| bounded(e.error_ratio, e.error_ratio_is), false),
             against(true, speed, false),

@@ -33,16 +33,16 @@ pub struct Report {
     pub skipped: Vec<Skipped>,
     /// Gains over all scenes of a half.
     pub summary: Vec<Gain>,
-    /// Wall time of the run in seconds; of that, for references that the cache did not hold.
+    /// Wall times of the run.
     pub seconds: Seconds,
 }
 
-/// Wall times.
+/// Wall times in seconds.
 #[derive(Clone, Copy, Debug, Default, Serialize)]
 pub struct Seconds {
     /// Of the run.
     pub total: f64,
-    /// For references.
+    /// For references, where the cache did not hold them, and errors.
     pub references: f64,
 }
 
@@ -101,6 +101,8 @@ pub struct Row {
     pub shaded_fraction: f64,
     /// GPU milliseconds from the first pass's begin to the last one's end.
     pub frame_ms: Summary,
+    /// The same of each round.
+    pub rounds_ms: Vec<f64>,
     /// GPU milliseconds of all passes added.
     pub passes_ms: Summary,
     /// Frame time over the first variant's.
@@ -178,6 +180,7 @@ impl Row {
     pub fn new(name: String, measured: Measured, first: &[FrameTimings]) -> Self {
         let Measured { stats, times } = measured;
         let spans = |times: &[FrameTimings]| times.iter().map(|t| t.span_ms).collect::<Vec<_>>();
+        let rounds_ms = spans(&times);
         let sums: Vec<f64> = times.iter().map(|t| t.passes.iter().map(|p| p.1).sum()).collect();
         let pass = |name: &'static str, bytes: u64| {
             let of = times.iter().filter_map(|t| t.passes.iter().find(|p| p.0 == name)).map(|p| p.1);
@@ -188,9 +191,10 @@ impl Row {
         Self {
             name,
             shaded_fraction: stats.pixels.shaded as f64 / stats.pixels.covered.max(1) as f64,
-            frame_ms: Summary::of(&spans(&times)),
+            frame_ms: Summary::of(&rounds_ms),
+            over_first: ratio_of_medians(&rounds_ms, &spans(first)),
+            rounds_ms,
             passes_ms: Summary::of(&sums),
-            over_first: ratio_of_medians(&spans(&times), &spans(first)),
             passes: stats.passes.iter().map(|p| pass(p.name, p.bytes)).collect(),
             settings: stats.settings,
             pixels: stats.pixels,

@@ -54,17 +54,19 @@ pub fn ratio_of_medians(a: &[f64], b: &[f64]) -> Option<Ratio> {
     Some(Ratio { ratio: median(a.to_vec()) / median(b.to_vec()), interval: bootstrap(rounds, ratio) })
 }
 
-fn median(values: Vec<f64>) -> f64 {
+/// The median of `values`; 0 without any.
+pub(super) fn median(values: Vec<f64>) -> f64 {
     Quantiles::of(values).median
 }
 
-fn pick(values: &[f64], indices: &[usize]) -> Vec<f64> {
+/// Those of `values` at `indices`.
+pub(super) fn pick(values: &[f64], indices: &[usize]) -> Vec<f64> {
     indices.iter().filter_map(|i| values.get(*i).copied()).collect()
 }
 
 /// Percentile bootstrap (Efron 1979): the interval of `statistic` over `count` indices drawn with replacement, the same in
 /// every run.
-fn bootstrap(count: usize, statistic: impl Fn(&[usize]) -> f64) -> [f64; 2] {
+pub(super) fn bootstrap(count: usize, statistic: impl Fn(&[usize]) -> f64) -> [f64; 2] {
     if count == 0 {
         return [0.0; 2];
     }

@@ -314,21 +314,21 @@ fn compare(rows: &mut [Row]) {
         let full = rows.iter().filter(|row| is(row, "rate", "full") && is(row, "estimator", estimator));
         let rung = |row: &Row| {
             let directions = row.settings.get("samples")?.as_u64()? as u32;
-            Some(Rung { directions, error: errors(row)?[measure], ms: row.frame_ms.median })
+            Some(Rung { directions, error: errors(row)?[measure], times: row.rounds_ms.clone() })
         };
         full.filter_map(rung).collect()
     };
     let ladders = ["mis", "brdf-random"].map(|estimator| (estimator, [0, 1].map(|measure| ladder(estimator, measure))));
     for row in rows {
-        let (ms, Some([linear, shown])) = (row.frame_ms.median, errors(row)) else { continue };
+        let Some([linear, shown]) = errors(row) else { continue };
         let own = ladders.iter().filter(|(estimator, _)| match is(row, "estimator", estimator) {
             true => !is(row, "rate", "full"),
             false => *estimator == "mis",
         });
         let against = |(estimator, [rmse, psnr]): &(&'static str, [Vec<Rung>; 2])| Against {
             estimator,
-            rmse: equal(rmse, linear, ms),
-            psnr: equal(psnr, shown, ms),
+            rmse: equal(rmse, linear, &row.rounds_ms),
+            psnr: equal(psnr, shown, &row.rounds_ms),
         };
         row.against = own.map(against).collect();
     }
