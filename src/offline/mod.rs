@@ -2,6 +2,7 @@
 //! The only part of the crate that creates instances, devices or queues, reads files or the environment, or prints.
 
 pub mod aov;
+pub mod bench;
 pub mod builtin;
 mod cache;
 pub mod environment;

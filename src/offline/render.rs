@@ -16,7 +16,7 @@ use serde_json::json;
 use std::collections::BTreeMap;
 
 /// Frames before timing starts.
-const WARM_UP: u32 = 2;
+pub(crate) const WARM_UP: u32 = 2;
 /// Frames that are timed.
 const TIMED: u32 = 5;
 /// Directions of one frame of a reference: independent frames are averaged, so that no single dispatch runs for minutes.
@@ -62,7 +62,31 @@ pub struct Settings {
 }
 
 impl Settings {
-    fn config(&self) -> Config {
+    /// Defaults for an image of `extent` pixels: full rate, 64 directions, one sample a pixel, nothing beside it.
+    pub fn new(extent: [u32; 2]) -> Self {
+        let base = Config::new(extent);
+        Self {
+            extent,
+            rate: base.rate,
+            lmax: None,
+            probes: base.probes,
+            samples_per_cycle: base.samples_per_cycle,
+            operator: base.operator,
+            combine: base.combine,
+            filter: base.filter,
+            geometric: base.geometric,
+            samples: base.directions,
+            estimator: base.estimator,
+            samples_per_side: base.samples_per_side,
+            seed: 0,
+            aovs: Vec::new(),
+            reference: None,
+            timed: false,
+            device: Options::default(),
+        }
+    }
+
+    pub(crate) fn config(&self) -> Config {
         let base = Config::new(self.extent);
         Config {
             samples_per_side: self.samples_per_side,
@@ -132,7 +156,8 @@ pub fn render(world: &World, settings: &Settings, progress: &mut dyn FnMut(u32, 
     Ok(Rendered { image: LinearImage { width, height, channels }, stats })
 }
 
-fn statistics(
+/// Statistics of the session's last frame and of the times of some.
+pub(crate) fn statistics(
     world: &World,
     settings: &Settings,
     config: &Config,

@@ -1,11 +1,13 @@
 //! The `passband` command: one file a subcommand.
 
+mod bench;
 mod compare;
 mod environment;
 mod info;
 mod material;
 mod render;
 mod scenes;
+mod sheet;
 
 use clap::error::ErrorKind;
 use clap::{Parser, Subcommand};
@@ -24,6 +26,7 @@ struct Cli {
 
 #[derive(Subcommand)]
 enum Command {
+    Bench(Box<bench::Args>),
     Render(Box<render::Args>),
     Compare(compare::Args),
     Environment(environment::Args),
@@ -38,6 +41,7 @@ fn main() -> ExitCode {
         Err(error) => return usage(&error),
     };
     let result = match &cli.command {
+        Command::Bench(args) => bench::run(args),
         Command::Render(args) => render::run(args),
         Command::Compare(args) => compare::run(args),
         Command::Environment(args) => environment::run(args),

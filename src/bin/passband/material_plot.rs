@@ -1,14 +1,13 @@
 //! The plot of `passband material`: lobes, slices and energy on one sheet.
 
+use crate::sheet::{self, Area, Drawn, legend};
 use glam::DVec3;
-use passband::offline::error::{Error, Result};
-use passband::offline::image_io::write_png;
+use passband::offline::error::Result;
 use passband::reflectance::Reflectance;
 use passband::reflectance::analysis::{albedo, at};
 use passband::sampling::luminance;
 use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::*;
-use plotters::style::{FontStyle, register_font};
 use std::path::Path;
 
 const SIZE: (u32, u32) = (1600, 1200);
@@ -23,38 +22,18 @@ const DECADES: f64 = 5.0;
 /// Cells a side of the image slice.
 const CELLS: usize = 180;
 
-type Area<'a> = DrawingArea<BitMapBackend<'a>, plotters::coord::Shift>;
 type Chart<'a, 'b> = ChartContext<'a, BitMapBackend<'b>, Cartesian2d<RangedCoordf64, RangedCoordf64>>;
 
 /// Draws `reflectance` and writes it as a PNG.
 pub fn write(path: &Path, title: &str, reflectance: &dyn Reflectance) -> Result<()> {
-    let mut rgb = vec![255; SIZE.0 as usize * SIZE.1 as usize * 3];
-    // Registering again does no harm.
-    let font = register_font("sans-serif", FontStyle::Normal, epaint_default_fonts::UBUNTU_LIGHT);
-    font.map_err(|_| failed(path, &"the typeface is damaged"))?;
-    draw(&mut rgb, title, reflectance).map_err(|e| failed(path, &e))?;
-    let rgba: Vec<u8> = rgb.as_chunks().0.iter().flat_map(|&[r, g, b]| [r, g, b, 255]).collect();
-    write_png(path, SIZE.0, SIZE.1, &rgba)
-}
-
-fn failed(path: &Path, reason: &dyn ToString) -> Error {
-    Error::Write { path: path.into(), reason: reason.to_string() }
-}
-
-type Drawn = std::result::Result<(), Box<dyn std::error::Error>>;
-
-fn draw(rgb: &mut [u8], title: &str, reflectance: &dyn Reflectance) -> Drawn {
-    let root = BitMapBackend::with_buffer(rgb, SIZE).into_drawing_area();
-    root.fill(&WHITE)?;
-    let root = root.margin(14, 0, 0, 0).titled(title, ("sans-serif", 34))?;
-    let panels = root.split_evenly((2, 2));
-    let [lobes_at, slice_at, image_at, energy_at] = panels.as_slice() else { return Err("the sheet has four panels".into()) };
-    lobes(lobes_at, reflectance)?;
-    slice(slice_at, reflectance)?;
-    image(image_at, reflectance)?;
-    energy(energy_at, reflectance)?;
-    root.present()?;
-    Ok(())
+    sheet::write(path, SIZE, title, |root| {
+        let panels = root.split_evenly((2, 2));
+        let [lobes_at, slice_at, image_at, energy_at] = panels.as_slice() else { return Err("the sheet has four panels".into()) };
+        lobes(lobes_at, reflectance)?;
+        slice(slice_at, reflectance)?;
+        image(image_at, reflectance)?;
+        energy(energy_at, reflectance)
+    })
 }
 
 /// A panel with axes.
@@ -89,17 +68,6 @@ fn curve(chart: &mut Chart<'_, '_>, points: Vec<(f64, f64)>, colour: RGBColor, l
         .draw_series(LineSeries::new(points, colour.stroke_width(2)))?
         .label(label)
         .legend(move |(x, y)| PathElement::new([(x, y), (x + 24, y)], colour.stroke_width(3)));
-    Ok(())
-}
-
-fn legend<'a, 'b: 'a>(chart: &mut Chart<'a, 'b>, position: SeriesLabelPosition) -> Drawn {
-    chart
-        .configure_series_labels()
-        .position(position)
-        .background_style(WHITE.mix(0.85))
-        .border_style(RGBColor(190, 190, 190))
-        .label_font(("sans-serif", 18))
-        .draw()?;
     Ok(())
 }
 

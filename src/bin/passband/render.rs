@@ -133,7 +133,8 @@ fn samples_per_cycle(text: &str) -> std::result::Result<SamplesPerCycle, String>
     rate.map(|x| SamplesPerCycle(Some(x))).ok_or_else(|| format!("expected a number > 0 or auto, got {text}"))
 }
 
-fn size(text: &str) -> std::result::Result<[u32; 2], String> {
+/// WIDTHxHEIGHT of an image.
+pub fn size(text: &str) -> std::result::Result<[u32; 2], String> {
     let parse = |t: &str| t.parse::<u32>().ok().filter(|e| (1..=16384).contains(e));
     let sides = text.split_once('x').and_then(|(w, h)| Some([parse(w)?, parse(h)?]));
     sides.ok_or_else(|| format!("expected WxH of 1 to 16384 pixels a side, got {text}"))

@@ -1,0 +1,161 @@
+//! `passband bench`: variants of a frame measured side by side.
+
+use clap::ValueEnum;
+use indicatif::{ProgressBar, ProgressStyle};
+use passband::offline::bench::report::Report;
+use passband::offline::bench::{reference, suites};
+use passband::offline::error::{Error, Result};
+use passband::offline::headless::Options;
+use passband::offline::image_io::{check_writable, write_atomically};
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+#[path = "bench_plot.rs"]
+mod plot;
+#[path = "bench_table.rs"]
+mod table;
+
+/// Measures what passes cost, and what variants of a frame gain at which error
+///
+/// Frames of all variants alternate in one run; the last row is the first variant once more, whose difference from the first is
+/// the noise of the measurement. Errors are against converged images, which are rendered when first needed and kept in the
+/// user's cache. Scenes that need fetched files are looked for under the working directory.
+#[derive(clap::Args)]
+pub struct Args {
+    /// Scene files or built-in names [default: the suite's own]
+    scenes: Vec<String>,
+    /// What to measure
+    #[arg(long)]
+    suite: Suite,
+    /// How much of it: few scenes at 256x256, or all at 512x512
+    #[arg(long, default_value = "quick")]
+    preset: Preset,
+    /// Timed frames of each variant [default: 5 of quick, 9 of full]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    rounds: Option<u32>,
+    /// Image size [default: the scene's, else the preset's]
+    #[arg(long, value_name = "WxH", value_parser = crate::render::size)]
+    size: Option<[u32; 2]>,
+    /// A device's index or part of its name (see `passband info`)
+    #[arg(long, value_name = "NAME|INDEX")]
+    device: Option<String>,
+    /// Write everything that was found
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+    /// Write a plot of error over time for each scene into this folder
+    #[arg(long, value_name = "FOLDER")]
+    plots: Option<PathBuf>,
+    /// Write a page to look at
+    #[arg(long, value_name = "FILE.html")]
+    report: Option<PathBuf>,
+    /// Compare with an earlier run
+    #[arg(long, value_name = "FILE.json")]
+    baseline: Option<PathBuf>,
+    /// Go on with an interrupted run
+    #[arg(long, value_name = "FILE.json")]
+    resume: Option<PathBuf>,
+    /// Write a trace for viewers of traces
+    #[arg(long, value_name = "FILE.json")]
+    trace: Option<PathBuf>,
+    /// Exit with 1 if the metric is above X (repeatable)
+    #[arg(long, value_name = "METRIC=X")]
+    max: Vec<String>,
+    /// Exit with 1 if the metric is below X (repeatable)
+    #[arg(long, value_name = "METRIC=X")]
+    min: Vec<String>,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum Suite {
+    Passes,
+    Bagher,
+    Xu,
+    Tan,
+    Residual,
+    Joined,
+    Scaling,
+    All,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum Preset {
+    Quick,
+    Full,
+}
+
+impl Args {
+    fn order(&self) -> Result<suites::Order> {
+        let later = |yes: bool, what: &str| if yes { Err(Error::NotSupportedYet { what: what.into() }) } else { Ok(()) };
+        later(self.report.is_some(), "--report")?;
+        later(self.baseline.is_some(), "--baseline")?;
+        later(self.resume.is_some(), "--resume")?;
+        later(self.trace.is_some(), "--trace")?;
+        later(!self.max.is_empty(), "bench --max")?;
+        later(!self.min.is_empty(), "bench --min")?;
+        let suite = match self.suite {
+            Suite::Passes => suites::Suite::Passes,
+            Suite::Bagher => suites::Suite::Bagher,
+            Suite::Xu | Suite::Tan | Suite::Residual | Suite::Joined | Suite::Scaling | Suite::All => {
+                return Err(Error::NotSupportedYet { what: "--suite xu, tan, residual, joined, scaling and all".into() });
+            }
+        };
+        later(self.plots.is_some() && suite != suites::Suite::Bagher, "--plots of a suite without errors")?;
+        Ok(suites::Order {
+            suite,
+            preset: match self.preset {
+                Preset::Quick => suites::Preset::Quick,
+                Preset::Full => suites::Preset::Full,
+            },
+            rounds: self.rounds,
+            extent: self.size,
+            scenes: self.scenes.clone(),
+            device: Options { device: self.device.clone(), validate: false },
+            root: PathBuf::new(),
+            cache: reference::cache_folder(),
+        })
+    }
+}
+
+/// Runs the subcommand.
+pub fn run(args: &Args) -> Result<ExitCode> {
+    let order = args.order()?;
+    // Before the work, not after it.
+    if let Some(path) = &args.json {
+        check_writable(path)?;
+    }
+    if let Some(folder) = &args.plots {
+        std::fs::create_dir_all(folder).map_err(|e| Error::Write { path: folder.clone(), reason: e.to_string() })?;
+    }
+    let style = ProgressStyle::with_template("{msg} {bar:30} {pos}/{len} {eta}").unwrap_or_else(|_| ProgressStyle::default_bar());
+    let bar = ProgressBar::new(1).with_style(style);
+    let report = suites::run(&order, &mut |what, done, total| {
+        if bar.message() != what {
+            // The time left is of each step alone.
+            bar.reset_eta();
+            bar.set_message(what.to_string());
+        }
+        bar.set_length(total);
+        bar.set_position(done);
+    })?;
+    bar.finish_and_clear();
+    crate::print(table::text(&report))?;
+    if let Some(folder) = &args.plots {
+        plots(folder, &report)?;
+    }
+    if let Some(path) = &args.json {
+        let text = serde_json::to_string_pretty(&report).map_err(|e| Error::argument("--json", "numbers", e))?;
+        write_atomically(path, |file| file.write_all(text.as_bytes()))?;
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+fn plots(folder: &Path, report: &Report) -> Result<()> {
+    for scene in &report.scenes {
+        // A scene file's stem may hold anything but separators.
+        let path = folder.join(format!("{}.png", scene.name.replace(' ', "-")));
+        plot::write(&path, scene)?;
+        crate::print(format_args!("plot: {}", path.display()))?;
+    }
+    Ok(())
+}

@@ -1,0 +1,55 @@
+//! Sheets of plots, drawn into memory and written as PNG.
+
+use passband::offline::error::{Error, Result};
+use passband::offline::image_io::write_png;
+use plotters::coord::Shift;
+use plotters::coord::ranged1d::{AsRangedCoord, Ranged};
+use plotters::prelude::*;
+use plotters::style::{FontStyle, register_font};
+use std::path::Path;
+
+/// A part of a sheet.
+pub type Area<'a> = DrawingArea<BitMapBackend<'a>, Shift>;
+/// What drawing returns.
+pub type Drawn = std::result::Result<(), Box<dyn std::error::Error>>;
+
+/// Draws a sheet of `size` pixels under a title and writes it.
+///
+/// # Errors
+/// [`Error::Write`] if it cannot be drawn or written.
+pub fn write(path: &Path, size: (u32, u32), title: &str, draw: impl FnOnce(&Area<'_>) -> Drawn) -> Result<()> {
+    let failed = |reason: &dyn ToString| Error::Write { path: path.into(), reason: reason.to_string() };
+    let mut rgb = vec![255; size.0 as usize * size.1 as usize * 3];
+    // Registering again does no harm.
+    let font = register_font("sans-serif", FontStyle::Normal, epaint_default_fonts::UBUNTU_LIGHT);
+    font.map_err(|_| failed(&"the typeface is damaged"))?;
+    let sheet = |rgb: &mut [u8]| -> Drawn {
+        let root = BitMapBackend::with_buffer(rgb, size).into_drawing_area();
+        root.fill(&WHITE)?;
+        draw(&root.margin(14, 0, 0, 0).titled(title, ("sans-serif", 34))?)?;
+        root.present()?;
+        Ok(())
+    };
+    sheet(&mut rgb).map_err(|e| failed(&e))?;
+    let rgba: Vec<u8> = rgb.as_chunks().0.iter().flat_map(|&[r, g, b]| [r, g, b, 255]).collect();
+    write_png(path, size.0, size.1, &rgba)
+}
+
+/// The legend of all labelled series.
+pub fn legend<'a, 'b: 'a, X, Y>(
+    chart: &mut ChartContext<'a, BitMapBackend<'b>, Cartesian2d<X, Y>>,
+    position: SeriesLabelPosition,
+) -> Drawn
+where
+    X: Ranged<ValueType = f64> + AsRangedCoord<Value = f64>,
+    Y: Ranged<ValueType = f64> + AsRangedCoord<Value = f64>,
+{
+    chart
+        .configure_series_labels()
+        .position(position)
+        .background_style(WHITE.mix(0.85))
+        .border_style(RGBColor(190, 190, 190))
+        .label_font(("sans-serif", 18))
+        .draw()?;
+    Ok(())
+}

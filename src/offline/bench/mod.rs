@@ -1,0 +1,13 @@
+//! `passband bench`: variants of a frame measured side by side, speed beside error, as tables and JSON.
+//!
+//! Frames of all variants alternate in one run (A B B A ...); errors are against converged images that are kept on disk; gains
+//! are stated at equal error and at equal time, against full rate with the same and with the default estimator.
+
+pub mod cases;
+pub mod equal;
+pub mod quality;
+pub mod reference;
+pub mod report;
+pub mod runner;
+pub mod statistics;
+pub mod suites;

@@ -1,0 +1,202 @@
+//! Frames of several variants in turn, so that whatever else the machine does falls on all of them alike.
+
+use crate::gpu::timer::FrameTimings;
+use crate::offline::bench::quality::Frame;
+use crate::offline::error::Result;
+use crate::offline::headless::Headless;
+use crate::offline::render::{self, Settings};
+use crate::offline::session::Session;
+use crate::offline::stats::Stats;
+use crate::offline::world::World;
+use crate::{Config, Requirements};
+
+/// Frames of each variant before timing starts.
+pub const WARM_UP: u32 = render::WARM_UP;
+
+/// Something that renders frames and knows their times a frame late.
+pub trait Timed {
+    /// Renders a frame of this seed and waits for it.
+    ///
+    /// # Errors
+    /// The device's.
+    fn frame(&mut self, seed: [u32; 2]) -> Result<()>;
+
+    /// Times of the frame before the last.
+    fn timings(&self) -> Option<&FrameTimings>;
+}
+
+impl Timed for Session {
+    fn frame(&mut self, seed: [u32; 2]) -> Result<()> {
+        Session::frame(self, seed)
+    }
+
+    fn timings(&self) -> Option<&FrameTimings> {
+        Session::timings(self)
+    }
+}
+
+/// Times of `rounds` frames of each subject, after [`WARM_UP`] frames each. Every other round runs backwards: A B B A. One
+/// more frame of each, whose own time is not kept, brings the last one's. `progress` is told how many of how many frames are
+/// done. Without timestamps nothing is found.
+///
+/// # Errors
+/// The device's.
+pub fn interleave<T: Timed>(
+    subjects: &mut [T],
+    rounds: u32,
+    progress: &mut dyn FnMut(u64, u64),
+) -> Result<Vec<Vec<FrameTimings>>> {
+    let count = subjects.len();
+    let mut times = vec![Vec::new(); count];
+    let all = WARM_UP + rounds + 1;
+    let total = u64::from(all) * count as u64;
+    let mut done = 0;
+    for round in 0..all {
+        for i in 0..count {
+            let i = if round.is_multiple_of(2) { i } else { count - 1 - i };
+            let (Some(subject), Some(times)) = (subjects.get_mut(i), times.get_mut(i)) else { continue };
+            subject.frame([0, round])?;
+            if round > WARM_UP {
+                times.extend(subject.timings().cloned());
+            }
+            done += 1;
+            progress(done, total);
+        }
+    }
+    Ok(times)
+}
+
+/// What is measured: a world with settings.
+pub struct Variant<'a> {
+    /// Its row's name.
+    pub name: String,
+    /// What is rendered; `reference` and `timed` are not looked at.
+    pub settings: Settings,
+    /// The scene.
+    pub world: &'a World,
+}
+
+/// Variants on the device, each with a session of its own. The last is the first once more, untouched: the control, whose
+/// difference from the first is the measurement's own noise.
+pub struct Runner<'a> {
+    variants: Vec<(Variant<'a>, Config)>,
+    sessions: Vec<Session>,
+    times: Vec<Vec<FrameTimings>>,
+}
+
+/// What one variant took.
+pub struct Measured {
+    /// As `passband render --stats` has it.
+    pub stats: Stats,
+    /// Times of each frame.
+    pub times: Vec<FrameTimings>,
+}
+
+impl<'a> Runner<'a> {
+    /// Opens a session for each variant and for the control. `progress` is told how many of how many are open.
+    ///
+    /// # Errors
+    /// Of the settings, the device or the driver.
+    pub fn new(mut variants: Vec<Variant<'a>>, progress: &mut dyn FnMut(u64, u64)) -> Result<Self> {
+        if let Some(first) = variants.first() {
+            let name = format!("control: {}", first.name);
+            variants.push(Variant { name, settings: first.settings.clone(), world: first.world });
+        }
+        let total = variants.len() as u64;
+        let mut runner = Self { variants: Vec::new(), sessions: Vec::new(), times: Vec::new() };
+        for variant in variants {
+            let config = variant.settings.config();
+            config.validate()?;
+            let headless = Headless::new(&variant.settings.device, &Requirements::of(&config))?;
+            runner.sessions.push(Session::new(headless, variant.world, &config)?);
+            runner.variants.push((variant, config));
+            progress(runner.sessions.len() as u64, total);
+        }
+        Ok(runner)
+    }
+
+    /// Times `rounds` frames of each variant.
+    ///
+    /// # Errors
+    /// The device's.
+    pub fn time(&mut self, rounds: u32, progress: &mut dyn FnMut(u64, u64)) -> Result<()> {
+        self.times = interleave(&mut self.sessions, rounds, progress)?;
+        Ok(())
+    }
+
+    /// Name, statistics and times of every variant; the control is last.
+    ///
+    /// # Errors
+    /// The device's, on read-back.
+    pub fn measured(&mut self) -> Result<Vec<(String, Measured)>> {
+        let rows = self.variants.iter().zip(&mut self.sessions).zip(&self.times);
+        rows.map(|(((variant, config), session), times)| {
+            let stats = render::statistics(variant.world, &variant.settings, config, session, times)?;
+            Ok((variant.name.clone(), Measured { stats, times: times.clone() }))
+        })
+        .collect()
+    }
+
+    /// `count` frames of each variant but the control, with seeds that no timed frame and no reference has.
+    ///
+    /// # Errors
+    /// The device's, on read-back.
+    pub fn frames(&mut self, count: u32, progress: &mut dyn FnMut(u64, u64)) -> Result<Vec<Vec<Frame>>> {
+        let variants = self.sessions.len().saturating_sub(1);
+        let total = variants as u64 * u64::from(count);
+        let mut done = 0;
+        let mut frames = |session: &mut Session| {
+            let all = (0..count).map(|frame| {
+                session.frame([1, frame])?;
+                done += 1;
+                progress(done, total);
+                Frame::read(session)
+            });
+            all.collect()
+        };
+        self.sessions.iter_mut().take(variants).map(&mut frames).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::cell::RefCell;
+
+    /// Notes who renders; the nth frame takes n milliseconds.
+    struct Fake<'a> {
+        name: char,
+        log: &'a RefCell<String>,
+        frames: u32,
+        known: Option<FrameTimings>,
+    }
+
+    impl Timed for Fake<'_> {
+        fn frame(&mut self, [_, round]: [u32; 2]) -> Result<()> {
+            assert_eq!(round, self.frames, "another seed each round");
+            self.log.borrow_mut().push(self.name);
+            let span_ms = f64::from(self.frames);
+            self.known = (self.frames > 0).then(|| FrameTimings { passes: Vec::new(), span_ms });
+            self.frames += 1;
+            Ok(())
+        }
+
+        fn timings(&self) -> Option<&FrameTimings> {
+            self.known.as_ref()
+        }
+    }
+
+    #[test]
+    fn rounds_alternate_and_times_are_those_of_their_own_frames() {
+        let log = RefCell::default();
+        let mut subjects = ['A', 'B', 'C'].map(|name| Fake { name, log: &log, frames: 0, known: None });
+        let mut last = (0, 0);
+        let times = interleave(&mut subjects, 3, &mut |done, total| last = (done, total)).unwrap();
+        assert_eq!(*log.borrow(), "ABCCBAABCCBAABCCBA");
+        assert_eq!(last, (18, 18));
+        // Two frames of warm-up take 1 and 2; the sixth is not known yet when the run ends.
+        for times in times {
+            assert_eq!(times.iter().map(|t| t.span_ms).collect::<Vec<_>>(), [3.0, 4.0, 5.0]);
+        }
+    }
+}

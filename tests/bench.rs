@@ -1,0 +1,181 @@
+//! `passband bench` as users call it: small scenes, all of what it writes.
+
+use serde_json::Value;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+/// A folder of the test's own, in which the command runs and keeps its references.
+struct Folder(PathBuf);
+
+impl Folder {
+    fn new(test: &str) -> Self {
+        let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join("bench").join(test);
+        if path.exists() {
+            std::fs::remove_dir_all(&path).unwrap();
+        }
+        std::fs::create_dir_all(&path).unwrap();
+        Self(path)
+    }
+
+    fn run(&self, args: &[&str]) -> Output {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_passband"));
+        command.arg("bench").args(args).args(["--device", "llvmpipe"]).current_dir(&self.0);
+        // Caches of every system are under these.
+        command.env("XDG_CACHE_HOME", self.0.join("cache")).env("HOME", &self.0);
+        command.output().unwrap()
+    }
+
+    /// What a silent and successful run printed, and its JSON.
+    fn json(&self, args: &[&str]) -> (String, Value) {
+        let output = self.run(&[args, &["--json", "bench.json"]].concat());
+        assert!(output.status.success() && output.stderr.is_empty(), "{output:?}");
+        let json = serde_json::from_slice(&std::fs::read(self.0.join("bench.json")).unwrap()).unwrap();
+        (String::from_utf8(output.stdout).unwrap(), json)
+    }
+
+    fn references(&self) -> Vec<PathBuf> {
+        let folder = self.0.join("cache").join("passband").join("reference");
+        std::fs::read_dir(folder).unwrap().map(|e| e.unwrap().path()).collect()
+    }
+}
+
+fn number(value: &Value) -> f64 {
+    value.as_f64().unwrap_or_else(|| panic!("{value} is no number"))
+}
+
+/// 64x64 pixels by the scene's own size.
+const SCENE: &str = r#"
+[camera]
+position = [0, 0.5, 3.6]
+fov_y = 36
+size = [64, 64]
+[environment]
+builtin = "studio"
+[[objects]]
+builtin = "bumpy-sphere"
+material = "paint"
+detail = 64
+[materials.paint]
+reflectance = { ggx = { alpha = 0.2, f0 = 0.6, albedo = 0.2 } }
+"#;
+
+fn check_times(row: &Value) {
+    let frame = &row["frame_ms"];
+    let [low, median, high] = ["p10", "median", "p90"].map(|q| number(&frame[q]));
+    assert!(0.0 < low && low <= median && median <= high && number(&frame["mad"]) >= 0.0, "{frame}");
+    let [a, b] = [0, 1].map(|i| number(&frame["interval"][i]));
+    assert!(low <= high && a <= median && median <= b, "{frame}");
+    // Passes do not overlap on one queue of this driver; on a busy machine something may come between them.
+    let sum = number(&row["passes_ms"]["median"]);
+    assert!(sum <= 1.0001 * median && sum > 0.5 * median, "{sum} of {median}");
+    for pass in row["passes"].as_array().unwrap() {
+        let (bytes, ms) = (number(&pass["bytes"]), number(&pass["ms"]["median"]));
+        assert!(bytes > 0.0 && ms > 0.0 && (number(&pass["gb_per_s"]) / (bytes * 1e-6 / ms) - 1.0).abs() < 1e-9, "{pass}");
+    }
+}
+
+#[test]
+fn rates_are_compared_with_full_rate_beside_their_error() {
+    let folder = Folder::new("bagher");
+    std::fs::write(folder.0.join("small.toml"), SCENE).unwrap();
+    let args = ["small.toml", "--suite", "bagher", "--rounds", "3", "--plots", "plots"];
+    let (text, report) = folder.json(&args);
+    assert_eq!(
+        (&report["schema"], &report["suite"], &report["preset"], &report["rounds"]),
+        (&1.into(), &"bagher".into(), &"quick".into(), &3.into())
+    );
+    assert!(report["device"]["name"].as_str().unwrap().contains("llvmpipe"));
+    let scene = &report["scenes"][0];
+    assert_eq!((&scene["name"], &scene["half"], &scene["extent"]), (&"small".into(), &Value::Null, &serde_json::json!([64, 64])));
+    let reference = &scene["reference"];
+    assert!(number(&reference["margin"]) >= 8.0 && (0.7..1.4).contains(&number(&reference["agreement"])), "{reference}");
+    assert_eq!(reference["cached"], 0);
+
+    let rows = scene["variants"].as_array().unwrap();
+    let row = |name: &str| rows.iter().find(|r| r["name"] == name).unwrap_or_else(|| panic!("no {name}"));
+    rows.iter().for_each(check_times);
+    assert_eq!(rows.first().unwrap()["name"], "full 64");
+    assert_eq!(rows.last().unwrap()["name"], "control: full 64");
+    assert_eq!(rows.first().unwrap()["over_first"]["ratio"], 1.0);
+    let control = number(&rows.last().unwrap()["over_first"]["ratio"]);
+    assert!((0.2..5.0).contains(&control), "{control}");
+    let rmse = |name: &str| number(&row(name)["error"]["rmse"]);
+    let shaded = |name: &str| number(&row(name)["shaded_fraction"]);
+    // Errors fall with directions and rise with coarseness; the papers' own estimator is the worse one.
+    assert!(rmse("full 16") > 1.5 * rmse("full 64") && rmse("full 64") > 1.5 * rmse("full 256"));
+    assert!(rmse("quarter 64") > rmse("half 64") && rmse("half 64") > rmse("full 64"));
+    assert!(rmse("full brdf-random 64") > rmse("full 64"));
+    assert!(shaded("full 64") == 1.0 && shaded("half 64") < 0.7 && shaded("quarter 64") < shaded("half 64"));
+    assert!(number(&row("full 64")["error"]["psnr"]) > number(&row("full 16")["error"]["psnr"]));
+    // Nothing is compared with itself.
+    let against = |name: &str| row(name)["against"].as_array().unwrap().clone();
+    assert_eq!(against("full 64"), [Value::Null; 0]);
+    for name in ["half 64", "quarter 256", "full brdf-random 16"] {
+        let [mis] = against(name).try_into().unwrap();
+        assert!(mis["estimator"] == "mis" && number(&mis["rmse"]["speed_up"]) > 0.0, "{name}: {mis}");
+        let equal = &mis["rmse"];
+        assert!(number(&equal["interval"][0]) <= number(&equal["interval"][1]), "{equal}");
+        let gain = report["summary"].as_array().unwrap().iter().find(|g| g["variant"] == name && g["measure"] == "rmse").unwrap();
+        assert_eq!((&gain["median"]["factor"], &gain["median"]["is"]), (&mis["rmse"]["speed_up"], &mis["rmse"]["speed_up_is"]));
+    }
+    for what in ["small, 64x64", "control: full 64", "reference: ", "Speed-up at equal error", "plots/small.png"] {
+        assert!(text.contains(what), "{what} is not in\n{text}");
+    }
+    assert!(folder.0.join("plots").join("small.png").metadata().unwrap().len() > 10_000);
+
+    // The second run finds the reference; a damaged one is made again.
+    let errors = |report: &Value| {
+        report["scenes"][0]["variants"].as_array().unwrap().iter().map(|r| r["error"].clone()).collect::<Vec<_>>()
+    };
+    let (_, again) = folder.json(&args);
+    assert_eq!(again["scenes"][0]["reference"]["cached"], reference["directions"]);
+    assert_eq!(errors(&again), errors(&report), "frames and references are deterministic");
+    let [entry] = folder.references().try_into().unwrap();
+    let whole = std::fs::read(&entry).unwrap();
+    std::fs::write(&entry, &whole[..whole.len() / 2]).unwrap();
+    let (_, third) = folder.json(&args);
+    assert_eq!((&third["scenes"][0]["reference"], errors(&third)), (reference, errors(&report)));
+    assert_eq!(std::fs::read(&entry).unwrap(), whole);
+}
+
+#[test]
+fn passes_are_timed_one_by_one() {
+    let folder = Folder::new("passes");
+    let (text, report) = folder.json(&["furnace", "sphere", "--suite", "passes", "--rounds", "2", "--size", "32x16"]);
+    let names: Vec<_> = report["scenes"].as_array().unwrap().iter().map(|s| (&s["name"], &s["extent"])).collect();
+    let extent = &serde_json::json!([32, 16]);
+    assert_eq!(names, [(&"furnace".into(), extent), (&"sphere".into(), extent)]);
+    for scene in report["scenes"].as_array().unwrap() {
+        let rows = scene["variants"].as_array().unwrap();
+        rows.iter().for_each(check_times);
+        let passes = |row: &Value| {
+            row["passes"].as_array().unwrap().iter().map(|p| p["name"].as_str().unwrap().to_string()).collect::<Vec<_>>()
+        };
+        assert_eq!(passes(rows.first().unwrap()), passes(rows.last().unwrap()));
+        assert!(passes(rows.first().unwrap()).contains(&"shade".to_string()));
+        assert!(passes(&rows[1]).contains(&"upsample".to_string()) && scene["reference"].is_null());
+    }
+    assert!(text.contains("the first variant once more takes"), "{text}");
+}
+
+#[test]
+fn what_cannot_be_done_is_one_line() {
+    let folder = Folder::new("refused");
+    let cases: [(&[&str], &[&str]); 8] = [
+        (&[], &["--suite"]),
+        (&["--suite", "fast"], &["fast", "passes", "bagher"]),
+        (&["--suite", "xu"], &["not supported yet", "--suite"]),
+        (&["--suite", "passes", "--rounds", "0"], &["--rounds"]),
+        (&["--suite", "passes", "--report", "out.html"], &["not supported yet", "--report"]),
+        (&["--suite", "passes", "trio", "nowhere"], &["scene", "nowhere"]),
+        (&["--suite", "passes", "--json", "no/folder.json"], &["no/folder.json"]),
+        (&["--suite", "bagher", "--plots", "file"], &["file"]),
+    ];
+    std::fs::write(folder.0.join("file"), "in the way").unwrap();
+    for (args, parts) in cases {
+        let output = folder.run(args);
+        let said = String::from_utf8(output.stderr).unwrap();
+        assert_eq!((output.status.code(), said.lines().count(), output.stdout.len()), (Some(2), 1, 0), "{args:?}: {said}");
+        assert!(parts.iter().all(|part| said.contains(part)), "{args:?}: {said}");
+    }
+}
