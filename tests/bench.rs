@@ -1,6 +1,7 @@
 //! `passband bench` as users call it: small scenes, all of what it writes.
 
 use serde_json::Value;
+use sha2::{Digest, Sha256};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
@@ -136,6 +137,30 @@ fn rates_are_compared_with_full_rate_beside_their_error() {
     let (_, third) = folder.json(&args);
     assert_eq!((&third["scenes"][0]["reference"], errors(&third)), (reference, errors(&report)));
     assert_eq!(std::fs::read(&entry).unwrap(), whole);
+
+    // A whole entry of another image, as another version would have left it, is found out.
+    std::fs::write(&entry, changed(&whole, |_, mean| 1.5 * mean)).unwrap();
+    let (_, fourth) = folder.json(&args);
+    assert_eq!((&fourth["scenes"][0]["reference"], errors(&fourth)), (reference, errors(&report)));
+    // An interrupted one is continued: here nothing is in its second half yet.
+    std::fs::write(&entry, changed(&whole, |half, mean| if half == 1 { 0.0 } else { mean })).unwrap();
+    let (_, fifth) = folder.json(&args);
+    let continued = &fifth["scenes"][0]["reference"];
+    assert_eq!(2.0 * number(&continued["cached"]), number(&reference["directions"]));
+    assert!(continued["directions"] == reference["directions"] && number(&continued["agreement"]) < 1.4, "{continued}");
+}
+
+/// A cache entry of 64x64 pixels with other means, by half; a half whose means are all 0 counts no frames.
+fn changed(entry: &[u8], mean: impl Fn(usize, f32) -> f32) -> Vec<u8> {
+    const HALF: usize = 1 + 4 * 64 * 64;
+    let mut words: Vec<u32> = entry[32..].as_chunks::<4>().0.iter().map(|w| u32::from_le_bytes(*w)).collect();
+    assert_eq!((&words[..2], words.len()), ([64, 64].as_slice(), 3 + 2 * HALF));
+    for (half, words) in words[3..].chunks_mut(HALF).enumerate() {
+        words[1..].iter_mut().for_each(|w| *w = mean(half, f32::from_bits(*w)).to_bits());
+        words[0] *= u32::from(words[1..].iter().any(|w| *w != 0));
+    }
+    let content: Vec<u8> = words.into_iter().flat_map(u32::to_le_bytes).collect();
+    [Sha256::digest(&content).to_vec(), content].concat()
 }
 
 #[test]

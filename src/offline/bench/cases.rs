@@ -19,7 +19,7 @@ pub enum Half {
 /// A mesh in a reflectance under an environment.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Case {
-    /// A key of [`MESHES`].
+    /// A mesh, by the name that its scene has here.
     pub mesh: &'static str,
     /// A built-in (synthetic) reflectance.
     pub reflectance: &'static str,

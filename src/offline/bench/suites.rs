@@ -147,8 +147,8 @@ impl Preset {
     }
 }
 
-/// A tenth of the smallest error is the noise that a reference may have.
-const MARGIN: f64 = 10.0;
+/// The smallest error is to be ten times the noise of a reference; it is only estimated before, from two frames.
+const MARGIN: f64 = 12.0;
 /// Directions a pixel after which a reference is not refined further.
 const MOST_DIRECTIONS: u64 = 1 << 18;
 /// An [agreement](ReferenceReport::agreement) above this is no chance: what the cache held is of another renderer.
