@@ -60,11 +60,28 @@ struct Material {
     vec2 density;    // first texel of its density tile
     vec2 table;      // first texel of its table in y, z
     vec3 turn;       // cosine and sine of the angle from the tangent frame's x axis to the local one; handedness
+    vec4 lobes[2];   // the first two vMF lobes: mean direction, concentration; without branches, as most have no more
+    vec2 peaks;      // their densities at the centre; the first is a cosine-power's, too
     vec2 lobe;       // concentration and density at the centre of a lobe of weight 1, where a map replaces the lobes' own
     float sharpness; // of lobes, over that of the material's own
     float kernel;    // added to 2 / concentration of the lobes' own
     float area;      // projected area of the lobes so widened
 };
+
+// Concentration and density at the centre of the lobe that a record holds, as maps and filters leave it.
+vec2 material_lobe(Material m, uint record) {
+    float kappa = materials[record].f0.w;
+    vec4 lobe = materials[record].albedo;
+    bool own = m.lobe.y == 0.0;
+    float peak = own ? lobe.x : lobe.y * m.lobe.y;
+    kappa = own ? kappa : m.lobe.x;
+    if (MATERIAL_KERNEL) {
+        bool widened = m.kernel > 0.0;
+        kappa = widened ? kappa / (1.0 + 0.5 * kappa * m.kernel) : kappa;
+        peak = widened ? lobe.y * vmf_normalisation(kappa) / m.area : peak;
+    }
+    return vec2(kappa, peak);
+}
 
 Material material_load(uint id, float cos_o, vec3 turn, Factors factors) {
     Material m;
@@ -102,6 +119,16 @@ Material material_load(uint id, float cos_o, vec3 turn, Factors factors) {
         }
         m.area = max(area / weight, LEAST_PROJECTED_AREA);
     }
+
+    // Without lobes of its own, a record stands in, unused.
+    for (int k = 0; k < 2; ++k) {
+        bool there = vmf && m.record.kind.z > uint(k);
+        uint record = there ? m.record.kind.y + uint(k) : id;
+        vec2 lobe = material_lobe(m, record);
+        m.lobes[k] = there ? vec4(materials[record].f0.xyz, lobe.x) : vec4(0.0);
+        m.peaks[k] = there ? lobe.y : 0.0;
+    }
+    m.peaks.x = cosine ? blinn_phong_peak(m.record.f0.w) : m.peaks.x;
 
     uint angle = min(uint(acos_positive(clamp(cos_o, 0.0, 1.0)) * (2.0 * INV_PI * float(IMPORTANCE_ANGLES))), IMPORTANCE_ANGLES - 1u);
     vec4 steps = m.record.importance;
@@ -158,23 +185,16 @@ vec3 material_tables(Material m, vec3 wi, vec3 wo, vec3 h, vec3 t) {
 // Density of normals in 1/sr of the two kinds with V-cavity masking: cosine-power (src/reflectance/blinn_phong.rs) and a mixture
 // of vMF lobes (src/reflectance/vmf.rs).
 float material_distribution(Material m, vec3 h, vec3 t) {
-    bool vmf = m.record.kind.x == REFLECTANCE_VMF;
-    uint lobes = vmf ? m.record.kind.z : 1u;
-    float sum = 0.0;
-    for (uint i = 0u; i < lobes; ++i) {
-        // Without lobes of its own, a record stands in, unused.
-        MaterialRecord lobe = materials[vmf ? m.record.kind.y + i : 0u];
-        vec3 d = t - lobe.f0.xyz;
-        bool own = m.lobe.y == 0.0;
-        float kappa = own ? lobe.f0.w : m.lobe.x;
-        float peak = own ? lobe.albedo.x : lobe.albedo.y * m.lobe.y;
-        if (MATERIAL_KERNEL) {
-            bool widened = m.kernel > 0.0;
-            kappa = widened ? kappa / (1.0 + 0.5 * kappa * m.kernel) : kappa;
-            peak = widened ? lobe.albedo.y * vmf_normalisation(kappa) / m.area : peak;
-        }
-        float exponent = vmf ? -0.5 * kappa * dot(d, d) : blinn_phong_exponent(m.record.f0.a, h);
-        sum += (vmf ? peak : blinn_phong_peak(m.record.f0.a)) * exp(exponent);
+    vec3 d = t - m.lobes[0].xyz, e = t - m.lobes[1].xyz;
+    bool cosine = m.record.kind.x == REFLECTANCE_BLINN_PHONG;
+    float exponent = cosine ? blinn_phong_exponent(m.record.f0.a, h) : -0.5 * m.lobes[0].w * dot(d, d);
+    float sum = m.peaks.x * exp(exponent) + m.peaks.y * exp(-0.5 * m.lobes[1].w * dot(e, e));
+    uint count = m.record.kind.x == REFLECTANCE_VMF ? m.record.kind.z : 0u;
+    for (uint i = 2u; i < count; ++i) {
+        vec3 mu = materials[m.record.kind.y + i].f0.xyz;
+        vec2 lobe = material_lobe(m, m.record.kind.y + i);
+        vec3 d = t - mu;
+        sum += lobe.y * exp(-0.5 * lobe.x * dot(d, d));
     }
     return sum;
 }
