@@ -47,11 +47,12 @@ fn plane(model: passband::reflectance::Model, map: LatLong) -> World {
 }
 
 /// Of what the bandwidth would be if nothing cancelled. Curvature and the result travel as 16-bit floats (2^-11 each), the
-/// environment's bandwidth is within 0.3 % of its twin (tests/environment_bandwidth.rs), tables are 9-bit (2^-10).
-const BANDWIDTH: f64 = 2e-3;
+/// environment's bandwidth is within 0.3 % of its twin (tests/environment_bandwidth.rs), tables are 9-bit (2^-10). Measured: 1.1e-3, and 2e-3 to 6e-3 in fewer
+/// than a block of a hundred.
+const BANDWIDTH: f64 = 6e-3;
 /// Blocks of which a probe falls on the border between two texels of a bandwidth map, or between two view angles, may have any
 /// value up to their largest probe's: no more than this share.
-const BORDERS: f64 = 0.01;
+const BORDERS: f64 = 0.005;
 
 /// Every block of a frame against the twin.
 fn against_the_twin(world: &World, base: &Config, variants: &[(Operator, Combine)]) {
@@ -137,6 +138,29 @@ fn predicted_cycles_are_measured_cycles() {
     }
 }
 
+/// The pass on a ball of GGX too sharp to blur what it mirrors: the light's bandwidth is estimated there.
+#[test]
+fn a_sharp_lobe_is_predicted_as_a_mirror() {
+    for k in [64, 128] {
+        let map = builtin::environment(&format!("cosine-{k}"), 1024).unwrap();
+        let ball = world("sphere", 256, ggx(0.003, DVec3::ONE, DVec3::ZERO), map);
+        let mut session = session(&ball, &Config { curvature: true, ..predicted([512, 512], 2) });
+        session.frame([0, 0]).unwrap();
+        let frame = Frame::read(&mut session);
+        let exact = spectrum::seen(f64::from(k), 512);
+        let mut ratios: Vec<f64> = (0..frame.blocks[0] * frame.blocks[1])
+            .filter_map(|block| {
+                let (_, b) = exact[frame.samples(block, 2).next()?.0]?;
+                (b < 0.4).then(|| frame.prediction[block][0] / b)
+            })
+            .collect();
+        ratios.sort_by(f64::total_cmp);
+        let [low, median, high] = [0.05, 0.5, 0.95].map(|q| ratios[(ratios.len() as f64 * q) as usize]);
+        println!("K {k}: {low:.2} {median:.2} {high:.2} of {} blocks", ratios.len());
+        assert!(ratios.len() > 5000 && (0.85..1.15).contains(&median) && low > 0.5 && high < 2.0);
+    }
+}
+
 /// What a frame shows: radiance, covered pixels, the share of covered samples that was shaded.
 struct Shot {
     picture: Picture,
@@ -163,29 +187,35 @@ fn psnr(a: &Shot, b: &Shot) -> f64 {
 }
 
 /// Same points at the same samples: what differs is up-sampling alone.
-#[test]
-fn reconstruction_is_near_the_full_rate() {
+fn reconstructed(material: &str, bounds: &[(u32, f32, [f64; 2])]) {
     let extent = [512, 512];
-    // Samples a cycle, least PSNR in dB, largest share of samples.
-    let cases =
-        [("mirror-metal", [(2.0, 30.0, 0.2), (4.0, 35.0, 0.4)]), ("metallic-paint", [(2.0, 35.0, 0.2), (4.0, 40.0, 0.3)])];
-    for (name, bounds) in cases {
-        let knot = world("torus-knot", 256, table(name), builtin::environment("sun-sky", 1024).unwrap());
-        let full = shot(&knot, &config(extent, Estimator::Mis, 1024));
-        for (spc, least, most) in bounds {
-            let adaptive = |probes| shot(&knot, &Config { probes, samples_per_cycle: Some(spc), ..predicted(extent, 1024) });
-            let few = adaptive(4);
-            let found = psnr(&few, &full);
-            println!("{name}, {spc} samples a cycle: {:.3} of covered pixels at {found:.1} dB", few.shaded);
-            assert!(found > least && few.shaded < most, "{name}: {found} dB, {}", few.shaded);
-            if spc == 2.0 {
-                let many = adaptive(64);
-                let found_many = psnr(&many, &full);
-                println!("{name}, 64 probes: {:.3} at {found_many:.1} dB", many.shaded);
-                assert!((found - found_many).abs() < 0.5, "{name}: {found} dB with 4 probes, {found_many} with 64");
-            }
+    let knot = world("torus-knot", 256, table(material), builtin::environment("sun-sky", 1024).unwrap());
+    let full = shot(&knot, &config(extent, Estimator::Mis, 1024));
+    // At two samples a cycle and with four probes comes first.
+    let mut four = None;
+    for &(probes, spc, [least, most]) in bounds {
+        let adaptive = shot(&knot, &Config { probes, samples_per_cycle: Some(spc), ..predicted(extent, 1024) });
+        let found = psnr(&adaptive, &full);
+        println!("{material}, {probes} probes, {spc} samples a cycle: {:.3} of covered pixels, {found:.1} dB", adaptive.shaded);
+        assert!(found > least && adaptive.shaded < most, "{material}: {found} dB, {}", adaptive.shaded);
+        let (four, share) = *four.get_or_insert((found, adaptive.shaded));
+        if probes == 64 {
+            // With as many samples at least.
+            assert!(share < 1.05 * adaptive.shaded && four > found - 0.5, "{material}: {four} dB with 4 probes, {found} with 64");
         }
     }
+}
+
+#[test]
+fn mirrors_are_near_the_full_rate() {
+    reconstructed("mirror-metal", &[(4, 2.0, [39.5, 0.18]), (64, 2.0, [39.5, 0.18]), (4, 4.0, [48.5, 0.27])]);
+}
+
+/// More probes find less to shade where few see the sun by chance (0.092 for 0.101 at two samples a cycle): samples, and the
+/// error with them, are as few probes' at 2.3.
+#[test]
+fn paint_is_near_the_full_rate() {
+    reconstructed("metallic-paint", &[(4, 2.0, [41.5, 0.11]), (64, 2.3, [41.0, 0.11]), (4, 4.0, [47.5, 0.21])]);
 }
 
 #[test]

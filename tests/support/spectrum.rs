@@ -10,9 +10,8 @@ const WINDOW: usize = 32;
 /// Cycles/pixel below which the window's own spectrum is what is measured, and above which pixels alias.
 const RANGE: [f64; 2] = [0.07, 0.45];
 
-/// Predicted over measured bandwidth, sorted, of the windows that lie on a unit ball under light `1 + cos(k angle from +X)` and
-/// whose measurement counts.
-pub fn ratios(k: f64, size: usize) -> Vec<f64> {
+/// Radiance of each pixel that shows a unit ball in light `1 + cos(k angle from +X)`, and the bandwidth by the operator.
+pub fn seen(k: f64, size: usize) -> Vec<Option<(f64, f64)>> {
     let camera = Camera { position: DVec3::new(0.0, 0.5, 3.6), target: DVec3::ZERO, up: DVec3::Y, fov_y: 36.0 };
     let extent = [size as u32; 2];
     let step = 2.0 * (camera.fov_y.to_radians() / 2.0).tan() / size as f64;
@@ -33,7 +32,12 @@ pub fn ratios(k: f64, size: usize) -> Vec<f64> {
             (radiance, Operator::default().image(k / TAU, 1e9, &surface))
         })
     };
-    let image: Vec<_> = (0..size * size).map(seen).collect();
+    (0..size * size).map(seen).collect()
+}
+
+/// Predicted over measured bandwidth, sorted, of the windows that lie on the ball and whose measurement counts.
+pub fn ratios(k: f64, size: usize) -> Vec<f64> {
+    let image = seen(k, size);
     let mut ratios = Vec::new();
     for top in (0..=size - WINDOW).step_by(WINDOW / 2) {
         for left in (0..=size - WINDOW).step_by(WINDOW / 2) {
