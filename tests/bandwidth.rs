@@ -35,7 +35,7 @@ fn sky(name: &str) -> LatLong {
 
 /// Squares of `side` texels, dark and light, in a map of 64.
 fn checks(side: usize) -> Maps {
-    let texel = |i: usize| [if (i % 64 / side + i / 64 / side) % 2 == 0 { 0.9 } else { 0.1 }; 3];
+    let texel = |i: usize| [if (i % 64 / side + i / 64 / side).is_multiple_of(2) { 0.9 } else { 0.1 }; 3];
     let albedo = Texture::colour([64; 2], &(0..64 * 64).map(texel).collect::<Vec<_>>()).unwrap();
     Maps { albedo: Some(Arc::new(albedo)), ..Maps::default() }
 }
@@ -47,8 +47,8 @@ fn plane(model: passband::reflectance::Model, map: LatLong) -> World {
 }
 
 /// Of what the bandwidth would be if nothing cancelled. Curvature and the result travel as 16-bit floats (2^-11 each), the
-/// environment's bandwidth is within 0.3 % of its twin (tests/environment_bandwidth.rs), tables are 9-bit (2^-10). Measured: 1.1e-3, and 2e-3 to 6e-3 in fewer
-/// than a block of a hundred.
+/// environment's bandwidth is within 0.3 % of its twin (tests/environment_bandwidth.rs), tables are 9-bit (2^-10).
+/// Measured: 1.1e-3, and 2e-3 to 6e-3 in fewer than one block of a hundred.
 const BANDWIDTH: f64 = 6e-3;
 /// Blocks of which a probe falls on the border between two texels of a bandwidth map, or between two view angles, may have any
 /// value up to their largest probe's: no more than this share.

@@ -130,7 +130,7 @@ impl<'a> Twin<'a> {
         let reflectance = material.at(DVec2::new(u, v), steps).reflectance(&material.model);
 
         let mut all = Directions { config, surface, found: Vec::new() };
-        let blocks = (block / frame.blocks[0]) << 16 | block % frame.blocks[0];
+        let blocks = ((block / frame.blocks[0]) << 16) | (block % frame.blocks[0]);
         let mut estimates = Vec::new();
         for i in 0..config.probes {
             let point = sobol::point(i, sobol::hash(blocks as u32) ^ seed).map(sobol::to_unit);
