@@ -23,6 +23,7 @@ layout(constant_id = 0) const int OPERATOR = OPERATOR_CLIPPED;
 layout(constant_id = 1) const int COMBINE = 0;
 const int COMBINE_MEAN = 0;
 const int COMBINE_MAX = 1;
+const int COMBINE_LITERAL = 2;
 // Whether the frame has lights beside the environment.
 layout(constant_id = 3) const bool LOCAL_LIGHTS = false;
 
@@ -48,16 +49,17 @@ const float SHARPEST = 1e6;
 
 // Sums over the probes of a block.
 struct Sums {
-    float weighted;  // bandwidth times weight
+    float weighted;  // bandwidth times weight, which has no density in equation 4 to the letter
     float weights;
     float radiance;
     float greatest;
     float squares;   // of the weights
 };
 
-void add(inout Sums s, float bandwidth, float radiance, float reflected) {
-    float weight = radiance * reflected;
-    s.weighted += bandwidth * weight;
+// What a direction reflects, and one over the density that it was drawn with.
+void add(inout Sums s, float bandwidth, float radiance, float reflected, float per_density) {
+    float weight = radiance * reflected * per_density;
+    s.weighted += bandwidth * (COMBINE == COMBINE_LITERAL ? radiance * reflected : weight);
     s.weights += weight;
     s.radiance += radiance;
     s.greatest = max(s.greatest, weight > 0.0 ? bandwidth : 0.0);
@@ -116,16 +118,17 @@ void main() {
         vec2 uv = latlong_uv(to_world(f, wi));
         uv.x -= frame.environment.x;
         float radiance = luminance(environment_fetch(uv).rgb);
-        float reflected = luminance(material_evaluate(m, wi, f.view, h.xyz)) * wi.z * 4.0 * cos_d / h.w;
+        float reflected = luminance(material_evaluate(m, wi, f.view, h.xyz)) * wi.z;
         float light = textureLod(environment_bandwidth, uv, 0.0).x;
         float lobe = texelFetch(lobe_bandwidths, lobe_bandwidth_texel(int(id), wi, f.view), 0).x * m.sharpness;
         float b = image_bandwidth(OPERATOR, light, lobe, curvatures, distance, f.view.z, angle);
-        add(s, b, above ? radiance : 0.0, above ? reflected : 0.0);
+        add(s, b, above ? radiance : 0.0, above ? reflected : 0.0, 4.0 * cos_d / h.w);
     }
     float mean = s.weights / float(push.probes);
     float variance = max(s.squares / float(push.probes) - mean * mean, 0.0);
 
-    // Lights beside the environment: without extent, which is the safe side for those that have some.
+    // Lights beside the environment: without extent, which is the safe side for those that have some. From one nearby, light
+    // turns along the surface as from a distant one where the surface is curved by half of cos / distance more.
     for (uint i = 0u; LOCAL_LIGHTS && i < frame.lights.x + frame.lights.y; ++i) {
         bool exact = i < frame.lights.x;
         vec4 w = exact ? light_exact(lights[i], point) : vec4(normalize(lights[i].place.xyz - point), 1.0);
@@ -135,10 +138,12 @@ void main() {
         vec3 h = normalize(wi + f.view);
         float solid = exact ? w.w : 1.0 / max(light_density(lights[i], point, w.xyz), 1e-6);
         float radiance = luminance(lights[i].power.rgb) * solid;
-        float reflected = luminance(material_evaluate(m, wi, f.view, h)) * wi.z * float(push.probes);
+        bool distant = exact && lights[i].place.w == LIGHT_DIRECTIONAL;
+        float nearness = distant ? 0.0 : 1.0 / max(length(lights[i].place.xyz - point), 1e-6);
+        float reflected = luminance(material_evaluate(m, wi, f.view, h)) * wi.z;
         float lobe = texelFetch(lobe_bandwidths, lobe_bandwidth_texel(int(id), wi, f.view), 0).x * m.sharpness;
-        float b = image_bandwidth(OPERATOR, SHARPEST, lobe, curvatures, distance, f.view.z, angle);
-        add(s, b, above ? radiance : 0.0, above ? reflected : 0.0);
+        float b = image_bandwidth(OPERATOR, SHARPEST, lobe, curvatures + 0.5 * wi.z * nearness, distance, f.view.z, angle);
+        add(s, b, above ? radiance : 0.0, above ? reflected : 0.0, float(push.probes));
     }
 
     float total = COMBINE == COMBINE_MEAN ? s.weights : s.radiance;

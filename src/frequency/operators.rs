@@ -66,13 +66,19 @@ pub fn pixel_angle(ray: [f64; 2], step: [f64; 2]) -> f64 {
     step[0].max(step[1]) / (1.0 + ray[0] * ray[0] + ray[1] * ray[1]).sqrt()
 }
 
+/// What a light at `distance` metres under `cosine` from the normal adds to the curvatures in 1/m: along the surface, its
+/// direction turns by cosine / distance, and reflection by twice the curvature.
+pub fn nearby(distance: f64, cosine: f64) -> f64 {
+    0.5 * cosine / distance
+}
+
 /// How the bandwidths of the probes of a pixel are combined.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Combine {
     /// Equation 4 as a mean: over the sum of its own weights.
     #[default]
     Mean,
-    /// The largest (figure 6).
+    /// The largest of those that bring light (figure 6).
     Max,
     /// Equation 4 to the letter: over the sum of radiance alone, which scales with the reflectance.
     Literal,
@@ -97,7 +103,7 @@ impl Combine {
         match self {
             Self::Mean => weighted(sum(|p| p.radiance * p.reflected)),
             Self::Literal => weighted(sum(|p| p.radiance)),
-            Self::Max => probes.iter().map(|p| p.bandwidth).fold(0.0, f64::max),
+            Self::Max => probes.iter().filter(|p| p.radiance * p.reflected > 0.0).map(|p| p.bandwidth).fold(0.0, f64::max),
         }
     }
 }

@@ -88,6 +88,32 @@ fn pixels_span_what_finite_differences_say() {
     assert!((pixel_angle([0.0; 2], [2.0 * 30f64.to_radians().tan() / 512.0; 2]) * 512.0 - 1.1547).abs() < 1e-4);
 }
 
+/// Over a plane, in the plane of incidence: how fast the light leaves the reflected ray, for a turn of the ray.
+#[test]
+fn nearby_lights_turn_as_finite_differences_say() {
+    let eye = glam::DVec3::new(-1.0, 2.0, 0.0);
+    for light in [[0.7, 1.1, 0.0], [0.1, 0.3, 0.0], [3.0, 0.5, 0.0]].map(glam::DVec3::from) {
+        let at = |x: f64| {
+            let to = |p: glam::DVec3| (p - glam::DVec3::new(x, 0.0, 0.0)).normalize();
+            let (view, light) = (to(eye), to(light));
+            // The angles of the mirrored view and of the light, and that of the ray.
+            (view.y.atan2(-view.x) - light.y.atan2(light.x), view.y.atan2(view.x))
+        };
+        let (x, h) = (0.2, 1e-5);
+        let [(a, ra), (b, rb)] = [x + h, x - h].map(at);
+        let point = glam::DVec3::new(x, 0.0, 0.0);
+        let [o, l] = [eye - point, light - point];
+        let surface = Surface {
+            curvatures: [nearby(l.length(), l.y / l.length()), 0.0],
+            distance: o.length(),
+            cosine: o.y / o.length(),
+            pixel: 1.0,
+        };
+        let expected = Operator::Clipped.image(1e6, 1.0, &surface);
+        assert!((((a - b) / (ra - rb)).abs() / expected - 1.0).abs() < 1e-4, "{light}: {} {expected}", (a - b) / (ra - rb));
+    }
+}
+
 #[test]
 fn means_are_means() {
     let probes: Vec<Probe> =
@@ -95,6 +121,8 @@ fn means_are_means() {
     let mean = Combine::Mean.over(&probes);
     assert!((mean - 2.0).abs() < 1e-12 && Combine::Max.over(&probes) == 4.0);
     assert!((Combine::Literal.over(&probes) - 0.5 * mean).abs() < 1e-12, "scales with the reflectance");
+    let unlit = Probe { bandwidth: 9.0, reflected: 0.5, ..Probe::default() };
+    assert_eq!(Combine::Max.over(&[probes[1], unlit]), 2.0, "brings no light");
     let dark = [Probe { bandwidth: 3.0, ..Probe::default() }];
     assert_eq!([Combine::Mean, Combine::Literal].map(|c| c.over(&dark)), [0.0; 2]);
 }
