@@ -101,7 +101,10 @@ fn every_documented_flag_works_or_is_not_supported_yet() {
     let (mut worked, mut later) = (Vec::new(), Vec::new());
     for (flag, values) in choices {
         for value in values.split_whitespace() {
-            let run = folder.render("furnace", &[flag, value, "-o", "out.exr"]);
+            // What the prediction finds is there where there is one.
+            let predicted = ["bandwidth", "spread"].contains(&value) && flag == "--aov";
+            let rate: &[&str] = if predicted { &["--rate", "bandwidth"] } else { &[] };
+            let run = folder.render("furnace", &[&[flag, value, "-o", "out.exr"], rate].concat());
             if run.code == 0 {
                 run.quiet();
                 worked.push(format!("{flag} {value}"));
@@ -123,7 +126,13 @@ fn every_documented_flag_works_or_is_not_supported_yet() {
         "--estimator brdf-random",
         "--aa 16",
         "--filter point",
+        "--filter tk",
+        "--rate bandwidth",
+        "--probes 4",
+        "--spc 2.5",
         "--aov curvature",
+        "--aov bandwidth",
+        "--aov spread",
     ] {
         assert!(worked.iter().any(|w| w == flag), "{flag}");
     }

@@ -111,11 +111,6 @@ fn keys_that_do_not_work_yet_say_so() {
         ),
     ];
     let settings = [
-        "operator = 'box'",
-        "operator = 'clipped'",
-        "operator = 'covariance'",
-        "combine = 'mean'",
-        "combine = 'max'",
         "eps = 0.01",
         "np_rule = 'constant'",
         "np_rule = 'eq8'",
@@ -128,7 +123,6 @@ fn keys_that_do_not_work_yet_say_so() {
         "eps1 = 0.85",
         "anisotropy = 8",
         "lod_bias = -0.5",
-        "geometric = true",
     ];
     for text in settings {
         lines.push(("material", format!("[settings]\n{text}"), text.split(' ').next().unwrap()));
@@ -436,4 +430,18 @@ fn builtin_scenes_resolve() {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("scenes/{name}.toml"));
         load(&path, &[]).unwrap();
     }
+}
+
+#[test]
+fn settings_reach_the_frame() {
+    use passband::frequency::operators::{Combine, Operator};
+    let load = |settings: &str| load_text(&with("material", &format!("[settings]\n{settings}")), &[]).unwrap();
+    assert_eq!(load("operator = 'box'").operator(), Operator::Box);
+    assert_eq!(load("operator = 'clipped'").operator(), Operator::Clipped);
+    assert_eq!(load("operator = 'covariance'").operator(), Operator::Covariance);
+    assert_eq!(load("combine = 'mean'").combine(), Combine::Mean);
+    assert_eq!(load("combine = 'max'").combine(), Combine::Max);
+    assert_eq!((load("lmax = 5").lmax(), load("geometric = true").geometric()), (Some(5), true));
+    let none = load("");
+    assert_eq!((none.operator(), none.combine(), none.lmax(), none.geometric()), (Operator::Clipped, Combine::Mean, None, false));
 }
