@@ -148,7 +148,7 @@ impl Aov {
                 scalar(covered.of(weights).map(|t| f32::from_bits(t[0])))
             }
             Self::Bandwidth | Self::Spread => {
-                let none = |_| Error::argument(&format!("--aov {name}"), "--rate bandwidth beside it", "another rate");
+                let none = |_| Error::argument(format!("--aov {name}"), "--rate bandwidth beside it", "another rate");
                 let (bytes, _, [width, _]) = session.image("prediction").map_err(none)?;
                 let halves: Vec<half::f16> = bytemuck::pod_collect_to_vec(&bytes);
                 let block = side.max(2) as usize;

@@ -64,7 +64,7 @@ pub struct Settings {
 
 impl Settings {
     fn rate(&self) -> Rate {
-        if self.reference.is_some() { Rate::Own(crate::Rate::Full) } else { self.rate }
+        if self.reference.is_some() { crate::Rate::Full.into() } else { self.rate }
     }
 
     fn config(&self) -> Config {

@@ -158,10 +158,10 @@ impl Args {
     fn settings(&self, scene_size: Option<[u32; 2]>, scene: Option<&Scene>) -> Result<Settings> {
         let later = |yes: bool, what: &str| if yes { Err(Error::NotSupportedYet { what: what.into() }) } else { Ok(()) };
         let rate = match self.rate {
-            Rate::Full => rates::Rate::Own(passband::Rate::Full),
-            Rate::Half => rates::Rate::Own(passband::Rate::Uniform(1)),
-            Rate::Quarter => rates::Rate::Own(passband::Rate::Uniform(2)),
-            Rate::Bandwidth => rates::Rate::Own(passband::Rate::Bandwidth),
+            Rate::Full => passband::Rate::Full.into(),
+            Rate::Half => passband::Rate::Uniform(1).into(),
+            Rate::Quarter => passband::Rate::Uniform(2).into(),
+            Rate::Bandwidth => passband::Rate::Bandwidth.into(),
             Rate::Luminance => rates::Rate::Luminance,
             Rate::Oracle => rates::Rate::Oracle,
         };

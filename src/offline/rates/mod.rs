@@ -21,6 +21,12 @@ pub enum Rate {
     Oracle,
 }
 
+impl From<crate::Rate> for Rate {
+    fn from(rate: crate::Rate) -> Self {
+        Self::Own(rate)
+    }
+}
+
 impl Rate {
     /// The renderer's own rate.
     pub fn of_renderer(self) -> crate::Rate {
