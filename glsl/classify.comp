@@ -7,12 +7,15 @@
 
 layout(local_size_x = 8, local_size_y = 8) in;
 
+// Bits of x in an entry of the list: 16, or 14 in a frame that has levels (list_entry of levels.glsl at level 0).
+layout(constant_id = 0) const int X_BITS = 16;
+
 layout(set = 2, binding = 1, std430) buffer Arguments {
     uint groups_x, groups_y, groups_z; // of the indirect dispatch
     uint count;
 } arguments;
 layout(set = 2, binding = 2, std430) writeonly buffer List {
-    uint list[]; // y << 16 | x
+    uint list[]; // y << X_BITS | x
 };
 
 shared uint tile_first;
@@ -35,6 +38,6 @@ void main() {
     }
     barrier();
     if (covered) {
-        list[tile_first + slot] = uint(p.y) << 16 | uint(p.x);
+        list[tile_first + slot] = uint(p.y) << X_BITS | uint(p.x);
     }
 }

@@ -136,7 +136,7 @@ impl Plan {
                 .then(|| image("level", vk::Format::R32_UINT, shading, storage | vk::ImageUsageFlags::TRANSFER_DST)),
             prediction: (config.rate == Rate::Bandwidth).then(|| {
                 let blocks = shading.map(|e| e.div_ceil(config.block_side()));
-                image("prediction", vk::Format::R16G16B16A16_SFLOAT, blocks, storage)
+                image("prediction", vk::Format::R16G16B16A16_SFLOAT, blocks, storage | vk::ImageUsageFlags::TRANSFER_DST)
             }),
             radiance: values("radiance", shading[0], even_rows),
             odd: (levels.top > 0).then(|| values("odd", shading[0].div_ceil(2), odd_rows)),
@@ -212,6 +212,9 @@ pub fn memory_footprint(config: &Config) -> Footprint {
     let mut rows: Vec<_> = plan.images().map(|d| FootprintRow { name: d.name, bytes: d.bytes() }).collect();
     rows.push(FootprintRow { name: "list", bytes: plan.list_bytes() });
     rows.extend(plan.cell_buffers().into_iter().filter(|b| b.1 > 0).map(|(name, bytes)| FootprintRow { name, bytes }));
+    if plan.prediction.is_some() {
+        rows.push(FootprintRow { name: "forecast", bytes: crate::pass::bandwidth::FORECAST_BYTES });
+    }
     rows.push(FootprintRow { name: "arguments", bytes: ARGUMENT_BYTES });
     rows.push(FootprintRow {
         name: "frame",

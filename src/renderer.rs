@@ -235,9 +235,10 @@ impl Renderer {
         // 4  The level of every sample: predicted, the same, or the host's.
         let shading = targets.plan.shading;
         let analysed = environment.bandwidth.as_ref().zip(materials.lobe_bandwidth.as_ref());
-        let predict = passes.bandwidth.as_ref().zip(analysed).zip(targets.prediction.as_ref());
+        let predict = passes.bandwidth.as_ref().zip(analysed).zip(targets.prediction.as_ref()).zip(targets.forecast.as_ref());
+        let mut forecast = None;
         let level = match (&targets.level, &inputs.levels) {
-            (Some(level), _) if let Some(((pass, (environment_bandwidth, lobe_bandwidth)), prediction)) = predict => {
+            (Some(level), _) if let Some((((pass, (environment_bandwidth, lobe_bandwidth)), prediction), groups)) = predict => {
                 pass.record(
                     rec,
                     &bandwidth::Io {
@@ -254,8 +255,10 @@ impl Renderer {
                         light_count: exact + area,
                         level,
                         prediction,
+                        forecast: groups,
                     },
                 );
+                forecast = Some(groups);
                 rec.image(level, Access::COMPUTE_SAMPLED);
                 Some(level.view)
             }
@@ -275,8 +278,18 @@ impl Renderer {
         let mut from = classify::From::Samples(shading);
         if let (Some(pass), Some(buffers), Some(view)) = (&passes.pyramid, &targets.cells, level) {
             let cells = buffers.cells();
-            pass.record(rec, &pyramid::Io { frame, bridge, level: (view, samplers.nearest), shading, cells });
-            from = classify::From::Cells(cells, &buffers.weights);
+            pass.record(
+                rec,
+                &pyramid::Io {
+                    frame,
+                    bridge,
+                    level: (view, samplers.nearest),
+                    shading,
+                    groups: forecast.map(|f| (f, bandwidth::OF_CELLS)),
+                    cells,
+                },
+            );
+            from = classify::From::Cells(cells, &buffers.weights, forecast.map(|f| (f, bandwidth::OF_SAMPLES)));
         }
 
         // 6  Which samples to shade.
@@ -458,7 +471,7 @@ impl Passes {
             curvature: config.curvature.then(|| curvature::Curvature::new(&mut p)).transpose()?,
             bandwidth: (config.rate == Rate::Bandwidth).then(|| bandwidth::Bandwidth::new(&mut p, config)).transpose()?,
             pyramid: (top > 0).then(|| pyramid::Pyramid::new(&mut p, top)).transpose()?,
-            classify: classify::Classify::new(&mut p, top)?,
+            classify: classify::Classify::new(&mut p, top, config.rate == Rate::Bandwidth)?,
             shade: shade::Shade::new(&mut p, config, top > 0)?,
             upsample: (top > 0).then(|| upsample::Upsample::new(&mut p, top)).transpose()?,
             resolve: resolve::Resolve::new(&mut p)?,

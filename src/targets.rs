@@ -7,6 +7,7 @@ use crate::gpu::image::Image;
 use crate::gpu::memory::Location;
 use crate::gpu::recorder::States;
 use crate::gpu::retire::{Build, Retired};
+use crate::pass::bandwidth::FORECAST_BYTES;
 use crate::pass::gbuffer::GBufferImages;
 use crate::pass::pyramid::Cells;
 use crate::plan::{ARGUMENT_BYTES, Plan};
@@ -22,6 +23,8 @@ pub(crate) struct Targets {
     pub level: Option<Image>,
     /// What the `bandwidth` pass finds in each block of samples.
     pub prediction: Option<Image>,
+    /// What the `bandwidth` pass decides on the next passes.
+    pub forecast: Option<Buffer>,
     pub cells: Option<CellBuffers>,
     pub radiance: Image,
     /// Radiance of odd levels.
@@ -79,6 +82,10 @@ impl Targets {
             curvature: plan.curvature.map(|desc| Image::new(build, desc)).transpose()?,
             level: plan.level.map(|desc| Image::new(build, desc)).transpose()?,
             prediction: plan.prediction.map(|desc| Image::new(build, desc)).transpose()?,
+            forecast: plan
+                .prediction
+                .map(|_| Buffer::new(build, "forecast", FORECAST_BYTES, arguments, Location::Device))
+                .transpose()?,
             cells: (plan.levels.top > 0).then(|| CellBuffers::new(build, &plan)).transpose()?,
             radiance: Image::new(build, plan.radiance)?,
             odd: plan.odd.map(|desc| Image::new(build, desc)).transpose()?,
@@ -106,6 +113,7 @@ impl Targets {
         match name {
             "arguments" => Some(&self.arguments),
             "list" => Some(&self.list),
+            "forecast" => self.forecast.as_ref(),
             "cells" => cells.map(|c| &c.cells),
             "blocks" => cells.map(|c| &c.blocks),
             "weights" => cells.map(|c| &c.weights),
@@ -122,7 +130,7 @@ impl Targets {
             image.retire(bag);
         }
         let cells = self.cells.map(|c| [c.cells, c.blocks, c.weights, c.arguments]);
-        for buffer in cells.into_iter().flatten().chain([self.arguments, self.list]) {
+        for buffer in cells.into_iter().flatten().chain(self.forecast).chain([self.arguments, self.list]) {
             states.forget(buffer.handle);
             buffer.retire(bag);
         }

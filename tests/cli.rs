@@ -260,7 +260,18 @@ fn coarse_rates_count_by_output_level() {
         assert!((0.0..=1.0).contains(&layer("weight.Y")[i]) && [0.0, 1.0].contains(&layer("shaded.Y")[i]));
     }
     assert!(layer("weight.Y").contains(&1.0) && layer("shaded.Y").contains(&1.0));
-    folder.render("trio", &["--rate", "oracle", "-o", "x.exr"]).refused(2, &["not supported yet", "--rate"]);
+}
+
+#[test]
+fn rates_to_compare_with_are_rendered() {
+    let folder = Folder::new("compared-rates");
+    for rate in ["luminance", "oracle"] {
+        let args = ["--size", "64x48", "--samples", "4", "--rate", rate, "--validate", "--stats", "stats.json", "-o", "out.exr"];
+        folder.render("trio", &args).quiet();
+        let report = folder.json("stats.json");
+        assert_eq!(report["settings"]["rate"], rate);
+        assert!(number(&report, "/pixels/shaded") < number(&report, "/pixels/covered"), "{report}");
+    }
 }
 
 #[test]

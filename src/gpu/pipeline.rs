@@ -292,11 +292,15 @@ impl ComputePipeline {
         if !self.interface.own.is_empty() {
             bind(2, own);
         }
+        self.push(rec, push);
+    }
+
+    /// Replaces the push constants between two dispatches of the same resources.
+    pub fn push<P: NoUninit>(&self, rec: &Recorder<'_>, push: &P) {
         if self.interface.push_bytes > 0 {
-            // SAFETY: the range is the pipeline layout's own.
-            unsafe {
-                device.cmd_push_constants(rec.cmd, self.layout, vk::ShaderStageFlags::COMPUTE, 0, bytemuck::bytes_of(push))
-            };
+            let (stages, bytes) = (vk::ShaderStageFlags::COMPUTE, bytemuck::bytes_of(push));
+            // SAFETY: the command buffer is recording; the range is the pipeline layout's own.
+            unsafe { rec.cx.device.cmd_push_constants(rec.cmd, self.layout, stages, 0, bytes) };
         }
     }
 

@@ -25,7 +25,8 @@ pub fn coarsest(session: &mut Session) -> Result<Vec<u32>> {
     let Some(levels) = session.levels() else { return Ok(Vec::new()) };
     let [width, height] = levels.extents.first().copied().unwrap_or_default();
     let mut all = vec![0; width as usize * height as usize];
-    if levels.top == 0 {
+    // Without blocks nothing is coarser than a sample, and the cells are those of another frame.
+    if levels.top == 0 || session.words("block arguments")?.get(3) == Some(&0) {
         return Ok(all);
     }
     let cells = session.words("cells")?;

@@ -15,6 +15,7 @@ pub mod levels;
 pub mod lobe_cache;
 pub mod mesh;
 pub mod metrics;
+pub mod rates;
 pub mod reference;
 pub mod render;
 pub mod scene;

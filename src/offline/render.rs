@@ -7,11 +7,12 @@ use crate::offline::error::Result;
 use crate::offline::headless::{Headless, Options};
 use crate::offline::image_io::LinearImage;
 use crate::offline::levels;
+use crate::offline::rates::Rate;
 use crate::offline::session::Session;
 use crate::offline::stats::{Pixels, Quantiles, Samples, Stats, pass_times};
 use crate::offline::world::World;
 use crate::plan::Directions;
-use crate::{Config, Estimator, Filter, Rate, Requirements};
+use crate::{Config, Estimator, Filter, Requirements};
 use serde_json::json;
 use std::collections::BTreeMap;
 
@@ -67,7 +68,7 @@ impl Settings {
         let base = Config::new(extent);
         Self {
             extent,
-            rate: base.rate,
+            rate: base.rate.into(),
             lmax: None,
             probes: base.probes,
             samples_per_cycle: base.samples_per_cycle,
@@ -86,13 +87,17 @@ impl Settings {
         }
     }
 
+    fn rate(&self) -> Rate {
+        if self.reference.is_some() { crate::Rate::Full.into() } else { self.rate }
+    }
+
     pub(crate) fn config(&self) -> Config {
         let base = Config::new(self.extent);
         Config {
             samples_per_side: self.samples_per_side,
             frames_in_flight: 1,
             estimator: if self.reference.is_some() { Estimator::Mis } else { self.estimator },
-            rate: if self.reference.is_some() { Rate::Full } else { self.rate },
+            rate: self.rate().of_renderer(),
             lmax: self.lmax.unwrap_or(base.lmax),
             probes: self.probes,
             samples_per_cycle: self.samples_per_cycle,
@@ -124,11 +129,14 @@ pub fn render(world: &World, settings: &Settings, progress: &mut dyn FnMut(u32, 
     config.validate()?;
     let headless = Headless::new(&settings.device, &Requirements::of(&config))?;
     let mut session = Session::new(headless, world, &config)?;
+    let rate = settings.rate();
+    rate.prepare(&mut session, world, &config, &settings.device, settings.seed)?;
     let chunks = settings.reference.map_or(1, |n| n.div_ceil(config.directions));
     let total = chunks + if settings.timed { WARM_UP + TIMED } else { 0 };
 
     let mut sum: Vec<f64> = Vec::new();
     for chunk in 0..chunks {
+        rate.follow(&mut session, &config)?;
         session.frame([settings.seed, chunk])?;
         let (bytes, ..) = session.image("resolved")?;
         let values: Vec<f32> = bytemuck::pod_collect_to_vec(&bytes);
@@ -146,6 +154,7 @@ pub fn render(world: &World, settings: &Settings, progress: &mut dyn FnMut(u32, 
     // A frame's times arrive when its slot is recorded again.
     let mut timings: Vec<FrameTimings> = Vec::new();
     for frame in 0..if settings.timed { WARM_UP + TIMED } else { 0 } {
+        rate.follow(&mut session, &config)?;
         session.frame([settings.seed, 0])?;
         if frame >= WARM_UP {
             timings.extend(session.timings().cloned());
@@ -181,16 +190,8 @@ pub(crate) fn statistics(
         Estimator::BrdfRandom => "brdf-random",
         Estimator::Lookup => "lookup",
     };
-    let rate = match config.rate {
-        Rate::Full => "full",
-        Rate::Uniform(1) => "half",
-        Rate::Uniform(2) => "quarter",
-        Rate::Uniform(_) => "uniform",
-        Rate::Given => "given",
-        Rate::Bandwidth => "bandwidth",
-    };
     let values = BTreeMap::from([
-        ("rate", json!(rate)),
+        ("rate", json!(settings.rate().name())),
         ("lmax", json!(config.lmax)),
         ("filter", json!(if config.filter == Filter::Tk { "tk" } else { "point" })),
         ("probes", json!(config.probes)),

@@ -12,9 +12,9 @@ use crate::gpu::pipeline::{BridgeSets, ComputePipeline, Interface, Resource};
 use crate::gpu::recorder::Recorder;
 use crate::gpu::retire::Retired;
 use crate::gpu::sampler::Samplers;
-use crate::pass::PassContext;
 use crate::pass::environment::EnvironmentImages;
 use crate::pass::materials::MaterialImages;
+use crate::pass::{PassContext, level, pyramid};
 use ash::vk::DescriptorType as D;
 use bytemuck::{Pod, Zeroable};
 
@@ -39,6 +39,7 @@ pub const INTERFACE: Interface = Interface {
         D::STORAGE_IMAGE,
         D::STORAGE_IMAGE,
         D::STORAGE_BUFFER,
+        D::STORAGE_BUFFER,
     ],
 };
 
@@ -49,7 +50,19 @@ struct Push {
     probes: i32,
     samples_per_cycle: f32,
     coarsest: i32,
+    stride: i32,
+    full: u32,
 }
+
+/// One block in so many a side is looked at first.
+const STRIDE: u32 = 4;
+
+/// Bytes of the forecast: groups in x, y, z of this pass, of the pyramid and of the list of all samples, each with a count.
+pub(crate) const FORECAST_BYTES: u64 = 48;
+/// Where the groups of the pyramid begin.
+pub(crate) const OF_CELLS: u64 = 16;
+/// Where the groups of the list of all samples begin.
+pub(crate) const OF_SAMPLES: u64 = 32;
 
 pub(crate) struct Io<'a> {
     pub frame: &'a Buffer,
@@ -67,10 +80,13 @@ pub(crate) struct Io<'a> {
     /// Exact lights first.
     pub lights: &'a Buffer,
     pub light_count: u32,
-    /// Out: the level of each sample, in levels over a sample.
+    /// Out: the level of each sample, in levels over a sample; 0 where all samples are shaded.
     pub level: &'a Image,
-    /// Out: of each block, bandwidth in cycles/sample and the integrand's relative standard deviation.
+    /// Out: of each block, bandwidth in cycles/sample and the integrand's relative standard deviation; 0 where all
+    /// samples are shaded.
     pub prediction: &'a Image,
+    /// Out: which of the next passes run.
+    pub forecast: &'a Buffer,
 }
 
 /// One pipeline for frames without lights beside the environment, one for frames with.
@@ -101,6 +117,8 @@ impl Bandwidth {
             probes: config.probes as i32,
             samples_per_cycle: rate,
             coarsest: config.coarsest() as i32,
+            stride: 1,
+            full: config.extent[0].saturating_mul(config.samples_per_side).div_ceil(8),
         };
         Ok(Self { pipelines: [make(0)?, make(1)?], push })
     }
@@ -113,8 +131,19 @@ impl Bandwidth {
         rec.image(io.lobe_bandwidth, Access::COMPUTE_SAMPLED);
         rec.image(io.normals, Access::COMPUTE_SAMPLED);
         rec.image(io.factors, Access::COMPUTE_SAMPLED);
-        rec.overwrite(io.level, Access::COMPUTE_WRITE);
-        rec.overwrite(io.prediction, Access::COMPUTE_WRITE);
+        level::clear(rec, io.level, 0);
+        level::clear(rec, io.prediction, 0);
+        rec.image(io.level, Access::COMPUTE_WRITE);
+        rec.image(io.prediction, Access::COMPUTE_WRITE);
+        rec.buffer(io.forecast, Access::TRANSFER_WRITE);
+        rec.flush();
+        let groups = |extent: [u32; 2], of: u32| extent.map(|e| e.div_ceil(of));
+        let [blocks, cells] = [groups(io.prediction.extent(), 8), groups(io.level.extent(), pyramid::TILE)];
+        let all = [blocks[0], blocks[1], 1, 0, cells[0], cells[1], 1, 0, 0, io.level.extent()[1].div_ceil(8), 1, 0];
+        let all: [u32; FORECAST_BYTES as usize / 4] = all;
+        // SAFETY: the command buffer is recording outside a render pass; the buffer holds as much.
+        unsafe { rec.cx.device.cmd_update_buffer(rec.cmd, io.forecast.handle, 0, bytemuck::bytes_of(&all)) };
+        rec.buffer(io.forecast, Access::COMPUTE_ATOMIC);
         rec.flush();
         let resources = [
             Resource::Uniform(io.frame),
@@ -127,10 +156,21 @@ impl Bandwidth {
             Resource::Storage(io.level.view),
             Resource::Storage(io.prediction.view),
             Resource::Buffer(io.lights),
+            Resource::Buffer(io.forecast),
         ];
         let pipeline = &self.pipelines[usize::from(io.light_count > 0)];
-        pipeline.bind(rec, io.bridge, &resources, &self.push);
-        pipeline.dispatch(rec, io.prediction.extent());
+        pipeline.bind(rec, io.bridge, &resources, &Push { stride: STRIDE as i32, ..self.push });
+        pipeline.dispatch(rec, groups(io.prediction.extent(), STRIDE));
+        // Where many samples are to be shaded, nothing follows: finding the others would take longer than they do.
+        rec.buffer(io.forecast, Access::INDIRECT);
+        rec.image(io.level, Access::COMPUTE_WRITE);
+        rec.image(io.prediction, Access::COMPUTE_WRITE);
+        rec.flush();
+        // To the validation layer every dispatch of the module writes all that it binds.
+        rec.buffer(io.forecast, Access::COMPUTE_ATOMIC);
+        rec.flush();
+        pipeline.push(rec, &self.push);
+        pipeline.dispatch_indirect(rec, io.forecast, 0);
         rec.end();
     }
 

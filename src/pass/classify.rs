@@ -46,8 +46,9 @@ pub const INTERFACES: [Interface; 2] = [
 pub(crate) enum From<'a> {
     /// Every covered one of this many samples is shaded.
     Samples([u32; 2]),
-    /// The pyramid, and the weights that are found: four words a block.
-    Cells(Cells<'a>, &'a Buffer),
+    /// The pyramid, and the weights that are found: four words a block. With groups in a buffer at an offset in bytes, the list
+    /// of all covered samples, instead of an empty pyramid.
+    Cells(Cells<'a>, &'a Buffer, Option<(&'a Buffer, u64)>),
 }
 
 pub(crate) struct Io<'a> {
@@ -60,13 +61,17 @@ pub(crate) struct Io<'a> {
     pub list: &'a Buffer,
 }
 
-pub(crate) struct Classify(ComputePipeline);
+/// With the pipeline that lists all samples of a frame with levels, if that may happen.
+pub(crate) struct Classify(ComputePipeline, Option<ComputePipeline>);
 
 impl Classify {
-    /// For levels up to `top`; 0 is the full rate.
-    pub fn new(p: &mut PassContext<'_, '_>, top: u32) -> Result<Self> {
-        let (interface, constants) = if top == 0 { (&INTERFACES[0], vec![]) } else { (&INTERFACES[1], vec![top]) };
-        Ok(Self(ComputePipeline::new(p.build, p.modules, interface, p.bridge, p.slots, &constants)?))
+    /// For levels up to `top`; 0 is the full rate. `either` is whether a frame with levels may list all samples.
+    pub fn new(p: &mut PassContext<'_, '_>, top: u32, either: bool) -> Result<Self> {
+        let (interface, constants) = if top == 0 { (&INTERFACES[0], vec![16]) } else { (&INTERFACES[1], vec![top]) };
+        let mut make =
+            |interface, constants: &[u32]| ComputePipeline::new(p.build, p.modules, interface, p.bridge, p.slots, constants);
+        let all = (top > 0 && either).then(|| make(&INTERFACES[0], &[14])).transpose()?;
+        Ok(Self(make(interface, &constants)?, all))
     }
 
     pub fn record(&self, rec: &mut Recorder<'_>, io: &Io<'_>) {
@@ -85,7 +90,7 @@ impl Classify {
                 self.0.bind(rec, io.bridge, &[Resource::Uniform(io.frame), arguments, list], &());
                 self.0.dispatch(rec, extent);
             }
-            From::Cells(Cells { cells, blocks, arguments: all }, weights) => {
+            From::Cells(Cells { cells, blocks, arguments: all }, weights, groups) => {
                 rec.buffer(cells, Access::COMPUTE_READ);
                 rec.buffer(blocks, Access::COMPUTE_READ);
                 rec.buffer(all, Access::INDIRECT);
@@ -96,6 +101,14 @@ impl Classify {
                 let resources = [Resource::Uniform(io.frame), cells, blocks, counts, weights, arguments, list];
                 self.0.bind(rec, io.bridge, &resources, &());
                 self.0.dispatch_indirect(rec, all, 0);
+                if let (Some(pipeline), Some((groups, offset))) = (&self.1, groups) {
+                    rec.buffer(groups, Access::INDIRECT);
+                    rec.buffer(io.arguments, Access::COMPUTE_ATOMIC);
+                    rec.buffer(io.list, Access::COMPUTE_WRITE);
+                    rec.flush();
+                    pipeline.bind(rec, io.bridge, &[Resource::Uniform(io.frame), arguments, list], &());
+                    pipeline.dispatch_indirect(rec, groups, offset);
+                }
             }
         }
         rec.end();
@@ -103,5 +116,8 @@ impl Classify {
 
     pub fn retire(self, bag: &mut Retired) {
         self.0.retire(bag);
+        if let Some(pipeline) = self.1 {
+            pipeline.retire(bag);
+        }
     }
 }

@@ -17,13 +17,18 @@ pub(crate) struct Io<'a> {
 /// Records a clear; there is no pipeline.
 pub(crate) fn record(rec: &mut Recorder<'_>, io: &Io<'_>) {
     rec.begin(NAME);
-    rec.overwrite(io.level, Access::TRANSFER_WRITE);
+    clear(rec, io.level, io.value);
+    rec.end();
+}
+
+/// Sets all words of an image.
+pub(crate) fn clear(rec: &mut Recorder<'_>, image: &Image, word: u32) {
+    rec.overwrite(image, Access::TRANSFER_WRITE);
     rec.flush();
-    let color = vk::ClearColorValue { uint32: [io.value; 4] };
+    let color = vk::ClearColorValue { uint32: [word; 4] };
     let range =
-        vk::ImageSubresourceRange { aspect_mask: io.level.desc.aspect(), level_count: 1, layer_count: 1, ..Default::default() };
+        vk::ImageSubresourceRange { aspect_mask: image.desc.aspect(), level_count: 1, layer_count: 1, ..Default::default() };
     let layout = Access::TRANSFER_WRITE.layout;
     // SAFETY: the command buffer is recording outside a render pass; the image was made ready above.
-    unsafe { rec.cx.device.cmd_clear_color_image(rec.cmd, io.level.handle, layout, &color, &[range]) };
-    rec.end();
+    unsafe { rec.cx.device.cmd_clear_color_image(rec.cmd, image.handle, layout, &color, &[range]) };
 }

@@ -25,7 +25,7 @@ pub const INTERFACE: Interface = Interface {
 };
 
 /// Samples a side of a workgroup: a cell of the coarsest level that there can be.
-const TILE: u32 = 32;
+pub(crate) const TILE: u32 = 32;
 
 /// The cells' buffers; `glsl/include/levels.glsl` says what they hold.
 #[derive(Clone, Copy)]
@@ -44,6 +44,8 @@ pub(crate) struct Io<'a> {
     /// The level of each sample, readable by compute shaders, and a sampler for it.
     pub level: (vk::ImageView, vk::Sampler),
     pub shading: [u32; 2],
+    /// Where the groups are, if not those of all samples: a buffer and an offset in bytes.
+    pub groups: Option<(&'a Buffer, u64)>,
     /// Out.
     pub cells: Cells<'a>,
 }
@@ -67,6 +69,9 @@ impl Pyramid {
         rec.buffer(arguments, Access::COMPUTE_ATOMIC);
         rec.buffer(cells, Access::COMPUTE_WRITE);
         rec.buffer(blocks, Access::COMPUTE_WRITE);
+        if let Some((groups, _)) = io.groups {
+            rec.buffer(groups, Access::INDIRECT);
+        }
         rec.flush();
         let (level, sampler) = io.level;
         let resources = [
@@ -77,7 +82,10 @@ impl Pyramid {
             Resource::Buffer(arguments),
         ];
         self.0.bind(rec, io.bridge, &resources, &());
-        self.0.dispatch(rec, io.shading.map(|e| e.div_ceil(TILE) * INTERFACE.local_size[0]));
+        match io.groups {
+            Some((groups, offset)) => self.0.dispatch_indirect(rec, groups, offset),
+            None => self.0.dispatch(rec, io.shading.map(|e| e.div_ceil(TILE) * INTERFACE.local_size[0])),
+        }
         rec.end();
     }
 

@@ -6,6 +6,7 @@ use passband::offline::error::{Error, Result};
 use passband::offline::headless::Options;
 use passband::offline::image_io::{LinearImage, check_writable, write_atomically, write_image};
 use passband::offline::metrics::{Exposure, encode};
+use passband::offline::rates;
 use passband::offline::render::{Settings, render};
 use passband::offline::scene::Scene;
 use passband::sampling::luminance;
@@ -158,13 +159,12 @@ impl Args {
     fn settings(&self, scene_size: Option<[u32; 2]>, scene: Option<&Scene>) -> Result<Settings> {
         let later = |yes: bool, what: &str| if yes { Err(Error::NotSupportedYet { what: what.into() }) } else { Ok(()) };
         let rate = match self.rate {
-            Rate::Full => passband::Rate::Full,
-            Rate::Half => passband::Rate::Uniform(1),
-            Rate::Quarter => passband::Rate::Uniform(2),
-            Rate::Bandwidth => passband::Rate::Bandwidth,
-            Rate::Luminance | Rate::Oracle => {
-                return Err(Error::NotSupportedYet { what: "--rate luminance and oracle".into() });
-            }
+            Rate::Full => passband::Rate::Full.into(),
+            Rate::Half => passband::Rate::Uniform(1).into(),
+            Rate::Quarter => passband::Rate::Uniform(2).into(),
+            Rate::Bandwidth => passband::Rate::Bandwidth.into(),
+            Rate::Luminance => rates::Rate::Luminance,
+            Rate::Oracle => rates::Rate::Oracle,
         };
         let estimator = match self.estimator {
             Method::Mis => Estimator::Mis,

@@ -259,7 +259,7 @@ fn variants<'a>(order: &Order, extent: [u32; 2], world: &'a World) -> Vec<Varian
         family.directions.iter().chain(more).map(move |directions| Variant {
             name: format!("{} {directions}", family.name),
             settings: Settings {
-                rate: family.rate,
+                rate: family.rate.into(),
                 estimator: family.estimator,
                 samples: *directions,
                 device: order.device.clone(),

@@ -1,0 +1,84 @@
+//! Rates that `bandwidth` is compared with: what shipped image-based variable-rate shading does, and the least that any rate
+//! needs. Both give [`crate::Rate::Given`] its levels and are worked out on the CPU, outside of the frame's time.
+
+pub mod luminance;
+pub mod oracle;
+
+use crate::Config;
+use crate::offline::error::Result;
+use crate::offline::headless::Options;
+use crate::offline::session::Session;
+use crate::offline::world::World;
+
+/// Where samples are shaded.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Rate {
+    /// As the renderer itself decides.
+    Own(crate::Rate),
+    /// By the contrast of the frame before ([`luminance`]).
+    Luminance,
+    /// With the fewest samples for the error of [`crate::Rate::Bandwidth`] ([`oracle`]).
+    Oracle,
+}
+
+impl From<crate::Rate> for Rate {
+    fn from(rate: crate::Rate) -> Self {
+        Self::Own(rate)
+    }
+}
+
+impl Rate {
+    /// The renderer's own rate.
+    pub fn of_renderer(self) -> crate::Rate {
+        match self {
+            Self::Own(rate) => rate,
+            Self::Luminance | Self::Oracle => crate::Rate::Given,
+        }
+    }
+
+    /// As `--rate` calls it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Luminance => "luminance",
+            Self::Oracle => "oracle",
+            Self::Own(crate::Rate::Full) => "full",
+            Self::Own(crate::Rate::Uniform(1)) => "half",
+            Self::Own(crate::Rate::Uniform(2)) => "quarter",
+            Self::Own(crate::Rate::Uniform(_)) => "uniform",
+            Self::Own(crate::Rate::Given) => "given",
+            Self::Own(crate::Rate::Bandwidth) => "bandwidth",
+        }
+    }
+
+    /// What comes before a session's first frame: two frames for `luminance`, the first at the full rate, so that the next one
+    /// follows a frame that itself followed one; all of the search for `oracle`. `seed` is of the frames.
+    ///
+    /// # Errors
+    /// The device's.
+    pub fn prepare(self, session: &mut Session, world: &World, config: &Config, device: &Options, seed: u32) -> Result<()> {
+        match self {
+            Self::Own(_) => Ok(()),
+            Self::Luminance => {
+                let samples = config.extent.map(|e| (e * config.samples_per_side) as usize);
+                session.set_levels(&vec![0; samples[0] * samples[1]])?;
+                session.frame([seed, 1])?;
+                self.follow(session, config)?;
+                session.frame([seed, 2])
+            }
+            Self::Oracle => session.set_levels(&oracle::levels(world, config, device, seed)?),
+        }
+    }
+
+    /// What comes before every frame: `luminance` looks at the frame before.
+    ///
+    /// # Errors
+    /// The device's.
+    pub fn follow(self, session: &mut Session, config: &Config) -> Result<()> {
+        if self != Self::Luminance {
+            return Ok(());
+        }
+        let (bytes, ..) = session.image("resolved")?;
+        let previous: Vec<[f32; 4]> = bytemuck::pod_collect_to_vec(&bytes);
+        session.set_levels(&luminance::levels(&previous, config.extent, config.samples_per_side, luminance::NOTICEABLE))
+    }
+}

@@ -1,0 +1,65 @@
+//! Image-based and best possible levels on scenes: what they shade and what it costs in error.
+
+#[path = "support/levels.rs"]
+mod support;
+
+use passband::offline::headless::Options;
+use passband::offline::levels;
+use passband::offline::rates::{Rate, oracle};
+use passband::{Config, Rate as Own};
+use support::{scene, session};
+
+fn config(rate: Own) -> Config {
+    Config { frames_in_flight: 1, rate, ..Config::new([160, 120]) }
+}
+
+#[test]
+fn the_oracle_shades_less_than_bandwidth_at_no_more_error() {
+    let device = Options { device: Some("llvmpipe".into()), validate: true };
+    for name in ["torus-knot", "trio"] {
+        let world = scene(name);
+        let config = config(Own::Given);
+        let (oracle, bandwidth) = oracle::of(&world, &config, &device, 0).unwrap();
+        let predicted = oracle.outcome(&bandwidth);
+        let (best, expected) = oracle.cheapest(predicted.error);
+        assert_eq!(oracle.outcome(&best), expected);
+        assert!(expected.error <= predicted.error && expected.shaded < predicted.shaded * 9 / 10, "{name}");
+        // Error that is free and error that is not allowed.
+        let (coarse, fine) = (oracle.cheapest(f64::INFINITY).1, oracle.cheapest(0.0).1);
+        assert!(coarse.shaded < expected.shaded && expected.shaded < fine.shaded && fine.error == 0.0, "{name}");
+
+        // The device does the same with them, and every covered sample gets a value.
+        let mut session = session(&world, &config);
+        session.set_levels(&best).unwrap();
+        session.frame([0, 0]).unwrap();
+        assert!(session.shaded().unwrap().abs_diff(expected.shaded as u32) <= expected.shaded as u32 / 200, "{name}");
+        let surface = support::surface(&mut session, &world, &config);
+        let pyramid = passband::frequency::reconstruction::Pyramid::new(&surface, &best, 3);
+        support::Frame::read(&mut session, &pyramid).checked_values(&surface);
+        assert_eq!(session.messages(), [""; 0]);
+    }
+}
+
+#[test]
+fn contrast_of_the_frame_before_steers_luminance() {
+    let world = scene("trio");
+    let config = config(Own::Given);
+    let mut session = session(&world, &config);
+    let device = Options { device: Some("llvmpipe".into()), validate: true };
+    Rate::Luminance.prepare(&mut session, &world, &config, &device, 0).unwrap();
+    Rate::Luminance.follow(&mut session, &config).unwrap();
+    session.frame([0, 0]).unwrap();
+    let shaded = levels::shaded(&mut session).unwrap();
+    let surface = support::surface(&mut session, &world, &config);
+    let covered = surface.samples.iter().flatten().count();
+    let of = |level: u32| shaded.iter().filter(|(_, l)| *l == level).count();
+    assert!([0, 1, 2].iter().all(|l| of(*l) > 20), "all three levels are used");
+    assert_eq!(of(3), 0, "and no other");
+    assert!(shaded.len() < covered * 4 / 5, "{} of {covered}", shaded.len());
+    // Every covered sample has a value: light comes from everywhere.
+    let (bytes, ..) = session.image("resolved").unwrap();
+    let image: Vec<[f32; 4]> = bytemuck::pod_collect_to_vec(&bytes);
+    let value = |i: usize| image[i][0] + image[i][1] + image[i][2];
+    assert!((0..image.len()).all(|i| surface.samples[i].is_none() || value(i) > 0.0));
+    assert_eq!(session.messages(), [""; 0]);
+}
