@@ -5,11 +5,14 @@ pub mod error;
 mod frame;
 pub mod frequency;
 pub mod gpu;
+#[cfg(feature = "offline")]
+mod inspect;
 pub mod light;
 pub mod material;
 #[cfg(feature = "offline")]
 pub mod offline;
 pub mod pass;
+mod passes;
 mod plan;
 pub mod reflectance;
 mod renderer;

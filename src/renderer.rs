@@ -1,13 +1,11 @@
 //! The frame, readable top to bottom: which pass, in which order, on which images.
 
-use crate::config::{Config, GBufferSource, Rate};
+use crate::config::{Config, Rate};
 use crate::error::{Error, Result};
 use crate::frame::{FrameInputs, GBufferInput, Output};
 use crate::gpu::access::Access;
 use crate::gpu::buffer::Buffer;
 use crate::gpu::context::{Context, Host};
-#[cfg(feature = "offline")]
-use crate::gpu::image::Image;
 use crate::gpu::memory::{HostAllocator, Location};
 use crate::gpu::pipeline::{BridgeLayouts, BridgeSets};
 use crate::gpu::recorder::{Recorder, States};
@@ -17,30 +15,16 @@ use crate::gpu::timer::{FrameTimings, GpuTimer};
 use crate::light;
 use crate::material::Material;
 use crate::pass::environment::{EnvironmentImages, EnvironmentUpload};
-use crate::pass::gbuffer::{self, GBuffer};
+use crate::pass::gbuffer;
 use crate::pass::materials::{MaterialBridge, MaterialImages, MaterialsUpload};
 use crate::pass::{
-    FrameUniform, PassContext, bandwidth, classify, curvature, environment_bandwidth, filter, level, pyramid, resolve, shade,
-    tonemap, upsample,
+    FrameUniform, PassContext, bandwidth, classify, curvature, filter, level, pyramid, resolve, shade, tonemap, upsample,
 };
+use crate::passes::{Passes, layout};
 use crate::plan::{Directions, LIGHT_BYTES};
 use crate::sampling::LatLong;
 use crate::targets::Targets;
 use ash::vk;
-
-/// Passes of the frame.
-struct Passes {
-    environment_bandwidth: environment_bandwidth::EnvironmentBandwidth,
-    gbuffer: Option<GBuffer>,
-    curvature: Option<curvature::Curvature>,
-    bandwidth: Option<bandwidth::Bandwidth>,
-    pyramid: Option<pyramid::Pyramid>,
-    classify: classify::Classify,
-    shade: shade::Shade,
-    upsample: Option<upsample::Upsample>,
-    resolve: resolve::Resolve,
-    tonemap: tonemap::Tonemap,
-}
 
 /// Says so when a renderer is dropped instead of destroyed: its handles leak, since submitted work may still use them.
 struct Undestroyed;
@@ -53,21 +37,21 @@ impl Drop for Undestroyed {
 
 /// The renderer: records frames into the host's command buffers. It never submits and never waits.
 pub struct Renderer {
-    cx: Context,
-    config: Config,
-    states: States,
+    pub(crate) cx: Context,
+    pub(crate) config: Config,
+    pub(crate) states: States,
     timer: GpuTimer,
     timings: Option<FrameTimings>,
     pass_bytes: Vec<(&'static str, u64)>,
-    samplers: Samplers,
-    bridge: MaterialBridge,
-    uniforms: Vec<Buffer>,
+    pub(crate) samplers: Samplers,
+    pub(crate) bridge: MaterialBridge,
+    pub(crate) uniforms: Vec<Buffer>,
     lights: Vec<Buffer>,
     passes: Passes,
-    targets: Targets,
-    environment: Option<EnvironmentImages>,
+    pub(crate) targets: Targets,
+    pub(crate) environment: Option<EnvironmentImages>,
     /// With the pass that is compiled for their maps.
-    materials: Option<(MaterialImages, filter::Filter)>,
+    pub(crate) materials: Option<(MaterialImages, filter::Filter)>,
     undestroyed: Undestroyed,
 }
 
@@ -387,127 +371,5 @@ impl Renderer {
         self.timer.retire(&mut bag);
         std::mem::forget(self.undestroyed);
         bag
-    }
-
-    /// One of the renderer's own colour images of the last frame, or the environment's bandwidth, by name.
-    #[cfg(feature = "offline")]
-    pub(crate) fn image(&self, name: &str) -> Option<&Image> {
-        let bandwidth = self.environment.as_ref().and_then(|e| e.bandwidth.as_ref()).filter(|i| i.desc.name == name);
-        bandwidth.or_else(|| self.targets.image(name))
-    }
-
-    /// One of the renderer's own buffers of the last frame, by name.
-    #[cfg(feature = "offline")]
-    pub(crate) fn buffer(&self, name: &str) -> Option<&Buffer> {
-        self.targets.buffer(name)
-    }
-
-    /// Records a [`probe`](crate::pass::probe) module over the current materials and environment, at this frame's environment use.
-    #[cfg(feature = "offline")]
-    pub(crate) fn record_probe(
-        &mut self,
-        cmd: vk::CommandBuffer,
-        inputs: &FrameInputs<'_>,
-        probe: &crate::pass::probe::Probe,
-        (input, count, output): (&Buffer, u32, &Buffer),
-    ) -> Result<()> {
-        let (Some(environment), Some((materials, _))) = (&self.environment, &self.materials) else {
-            return Err(Error::CallOrder { called: "record_probe", before: "record_environment and record_materials" });
-        };
-        let uniform = inputs.uniform(&self.config, &self.targets.plan, [0, 0]);
-        self.uniforms[inputs.slot].bytes_mut().copy_from_slice(bytemuck::bytes_of(&uniform));
-        let rec = &mut Recorder::new(&self.cx, cmd, inputs.slot, &mut self.states, None);
-        let bridge = BridgeSets { materials: self.bridge.write(rec, materials, &self.samplers), ..BridgeSets::NONE };
-        let (frame, samplers) = (&self.uniforms[inputs.slot], &self.samplers);
-        probe.record(rec, &crate::pass::probe::Io { frame, bridge, samplers, environment, materials, input, count, output });
-        Ok(())
-    }
-
-    /// Levels of shading.
-    #[cfg(feature = "offline")]
-    pub(crate) fn levels(&self) -> &crate::plan::Levels {
-        &self.targets.plan.levels
-    }
-
-    /// Forgets a buffer that is about to be destroyed.
-    #[cfg(feature = "offline")]
-    pub(crate) fn forget(&mut self, buffer: &Buffer) {
-        self.states.forget(buffer.handle);
-    }
-
-    /// Layout of set 1.
-    #[cfg(feature = "offline")]
-    pub(crate) fn material_layout(&self) -> vk::DescriptorSetLayout {
-        self.bridge.layout
-    }
-
-    #[cfg(feature = "offline")]
-    pub(crate) fn context(&self) -> &Context {
-        &self.cx
-    }
-
-    /// Records copies out of the renderer's images, which continue from the last frame's uses.
-    #[cfg(feature = "offline")]
-    pub(crate) fn copy_out(&mut self, cmd: vk::CommandBuffer, copy: impl FnOnce(&Self, &mut Recorder<'_>)) {
-        let mut states = std::mem::take(&mut self.states);
-        copy(self, &mut Recorder::new(&self.cx, cmd, 0, &mut states, None));
-        self.states = states;
-    }
-}
-
-impl Passes {
-    fn new(build: &mut Build<'_>, config: &Config, materials: vk::DescriptorSetLayout) -> Result<Self> {
-        let none = BridgeLayouts { gbuffer: vk::DescriptorSetLayout::null(), materials };
-        let mut p = PassContext { build, modules: &config.modules, bridge: none, slots: config.frames_in_flight };
-        let gbuffer = match config.gbuffer {
-            GBufferSource::Draws => Some(GBuffer::new(&mut p)?),
-            GBufferSource::Host { .. } => None,
-        };
-        p.bridge.gbuffer = layout(&gbuffer, config);
-        let top = config.coarsest();
-        Ok(Self {
-            environment_bandwidth: environment_bandwidth::EnvironmentBandwidth::new(&mut p)?,
-            gbuffer,
-            curvature: config.curvature.then(|| curvature::Curvature::new(&mut p)).transpose()?,
-            bandwidth: (config.rate == Rate::Bandwidth).then(|| bandwidth::Bandwidth::new(&mut p, config)).transpose()?,
-            pyramid: (top > 0).then(|| pyramid::Pyramid::new(&mut p, top)).transpose()?,
-            classify: classify::Classify::new(&mut p, top, config.rate == Rate::Bandwidth)?,
-            shade: shade::Shade::new(&mut p, config, top > 0)?,
-            upsample: (top > 0).then(|| upsample::Upsample::new(&mut p, top)).transpose()?,
-            resolve: resolve::Resolve::new(&mut p)?,
-            tonemap: tonemap::Tonemap::new(&mut p)?,
-        })
-    }
-
-    fn retire(self, bag: &mut Retired) {
-        self.environment_bandwidth.retire(bag);
-        if let Some(pass) = self.gbuffer {
-            pass.retire(bag);
-        }
-        if let Some(pass) = self.curvature {
-            pass.retire(bag);
-        }
-        if let Some(pass) = self.bandwidth {
-            pass.retire(bag);
-        }
-        if let Some(pass) = self.pyramid {
-            pass.retire(bag);
-        }
-        self.classify.retire(bag);
-        self.shade.retire(bag);
-        if let Some(pass) = self.upsample {
-            pass.retire(bag);
-        }
-        self.resolve.retire(bag);
-        self.tonemap.retire(bag);
-    }
-}
-
-/// Layout of set 0: our own G-buffer's or the host's.
-fn layout(own: &Option<GBuffer>, config: &Config) -> vk::DescriptorSetLayout {
-    match (own, config.gbuffer) {
-        (_, GBufferSource::Host { layout }) => layout,
-        (Some(own), GBufferSource::Draws) => own.layout,
-        (None, GBufferSource::Draws) => vk::DescriptorSetLayout::null(),
     }
 }

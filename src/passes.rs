@@ -1,0 +1,82 @@
+//! The frame's passes, created from a configuration: only those that it records.
+
+use crate::config::{Config, GBufferSource, Rate};
+use crate::error::Result;
+use crate::gpu::pipeline::BridgeLayouts;
+use crate::gpu::retire::{Build, Retired};
+use crate::pass::gbuffer::GBuffer;
+use crate::pass::{
+    PassContext, bandwidth, classify, curvature, environment_bandwidth, pyramid, resolve, shade, tonemap, upsample,
+};
+use ash::vk;
+
+/// Passes of the frame.
+pub(crate) struct Passes {
+    pub environment_bandwidth: environment_bandwidth::EnvironmentBandwidth,
+    pub gbuffer: Option<GBuffer>,
+    pub curvature: Option<curvature::Curvature>,
+    pub bandwidth: Option<bandwidth::Bandwidth>,
+    pub pyramid: Option<pyramid::Pyramid>,
+    pub classify: classify::Classify,
+    pub shade: shade::Shade,
+    pub upsample: Option<upsample::Upsample>,
+    pub resolve: resolve::Resolve,
+    pub tonemap: tonemap::Tonemap,
+}
+
+impl Passes {
+    pub fn new(build: &mut Build<'_>, config: &Config, materials: vk::DescriptorSetLayout) -> Result<Self> {
+        let none = BridgeLayouts { gbuffer: vk::DescriptorSetLayout::null(), materials };
+        let mut p = PassContext { build, modules: &config.modules, bridge: none, slots: config.frames_in_flight };
+        let gbuffer = match config.gbuffer {
+            GBufferSource::Draws => Some(GBuffer::new(&mut p)?),
+            GBufferSource::Host { .. } => None,
+        };
+        p.bridge.gbuffer = layout(&gbuffer, config);
+        let top = config.coarsest();
+        Ok(Self {
+            environment_bandwidth: environment_bandwidth::EnvironmentBandwidth::new(&mut p)?,
+            gbuffer,
+            curvature: config.curvature.then(|| curvature::Curvature::new(&mut p)).transpose()?,
+            bandwidth: (config.rate == Rate::Bandwidth).then(|| bandwidth::Bandwidth::new(&mut p, config)).transpose()?,
+            pyramid: (top > 0).then(|| pyramid::Pyramid::new(&mut p, top)).transpose()?,
+            classify: classify::Classify::new(&mut p, top, config.rate == Rate::Bandwidth)?,
+            shade: shade::Shade::new(&mut p, config, top > 0)?,
+            upsample: (top > 0).then(|| upsample::Upsample::new(&mut p, top)).transpose()?,
+            resolve: resolve::Resolve::new(&mut p)?,
+            tonemap: tonemap::Tonemap::new(&mut p)?,
+        })
+    }
+
+    pub fn retire(self, bag: &mut Retired) {
+        self.environment_bandwidth.retire(bag);
+        if let Some(pass) = self.gbuffer {
+            pass.retire(bag);
+        }
+        if let Some(pass) = self.curvature {
+            pass.retire(bag);
+        }
+        if let Some(pass) = self.bandwidth {
+            pass.retire(bag);
+        }
+        if let Some(pass) = self.pyramid {
+            pass.retire(bag);
+        }
+        self.classify.retire(bag);
+        self.shade.retire(bag);
+        if let Some(pass) = self.upsample {
+            pass.retire(bag);
+        }
+        self.resolve.retire(bag);
+        self.tonemap.retire(bag);
+    }
+}
+
+/// Layout of set 0: our own G-buffer's or the host's.
+pub(crate) fn layout(own: &Option<GBuffer>, config: &Config) -> vk::DescriptorSetLayout {
+    match (own, config.gbuffer) {
+        (_, GBufferSource::Host { layout }) => layout,
+        (Some(own), GBufferSource::Draws) => own.layout,
+        (None, GBufferSource::Draws) => vk::DescriptorSetLayout::null(),
+    }
+}
