@@ -135,7 +135,7 @@ Material material_load(uint id, float cos_o, vec3 turn, Factors factors) {
     float step_number = changed ? round((log2(square) - steps.z) * steps.w) : 0.0;
     uint tile = uint(steps.x + clamp(step_number, 0.0, steps.y));
     uvec2 at = uvec2((tile >> 6) * IMPORTANCE_ANGLES + angle, tile & 63u);
-    m.cell = ivec2(at * uvec2(IMPORTANCE_COLUMNS, IMPORTANCE_ROWS));
+    m.cell = ivec2((tile >> 6) * (IMPORTANCE_COLUMNS * IMPORTANCE_ROWS), (tile & 63u) * IMPORTANCE_ANGLES + angle);
     m.density = vec2(at) * DENSITY_SIZE;
     m.table = vec2(m.record.kind.yz) * TABLE_SIZE.yz;
     m.turn = turn;
@@ -220,7 +220,7 @@ vec4 material_sample(Material m, uvec2 u) {
     uint row, row_fraction, column, column_fraction;
     umulExtended(u.x, IMPORTANCE_ROWS, row, row_fraction);
     umulExtended(u.y << 1, IMPORTANCE_COLUMNS, column, column_fraction);
-    vec4 cell = texelFetch(importance_cells, m.cell + ivec2(column, row), 0);
+    vec4 cell = texelFetch(importance_cells, m.cell + ivec2(row * IMPORTANCE_COLUMNS + column, 0), 0);
     vec2 size = cell.yw - cell.xz;
     vec2 at = cell.xz + size * (vec2(ivec2(row_fraction >> 8, column_fraction >> 8)) * (1.0 / 16777216.0));
     float s = sqrt(at.x * (2.0 - at.x));

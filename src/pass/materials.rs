@@ -220,12 +220,13 @@ impl MaterialsUpload {
         let columns = importance.len().div_ceil(TILES_A_COLUMN) as u32;
         let count = importance.len().min(TILES_A_COLUMN) as u32;
         let table_extent = [PHI_DIFF as u32, THETA_DIFF as u32 * atlas[0], THETA_HALF as u32 * atlas[1]];
-        let cell_extent = [columns * angles * COLUMNS as u32, ROWS as u32 * count, 1];
+        // One angle's cells are one row of texels: what a pixel draws from lies together.
+        let cell_extent = [columns * (ROWS * COLUMNS) as u32, angles * count, 1];
         // A power of two on both sides: coordinates are exact, so that a clamp at a tile's edge keeps its neighbour out.
         let density_extent =
             [columns.next_power_of_two() * angles * DENSITY_COLUMNS as u32, DENSITY_ROWS as u32 * count.next_power_of_two(), 1];
         let texels = table_atlas(&packed, atlas);
-        let cells = in_columns(importance.iter().map(ImportanceTable::cells), ROWS, COLUMNS, columns as usize, [0.0; 4]);
+        let cells = in_rows(importance.iter().map(ImportanceTable::cells), columns as usize, [0.0; 4]);
         let tiles = importance.iter().map(ImportanceTable::density_texels);
         let mut density: Vec<f16> = in_columns(tiles, DENSITY_ROWS, DENSITY_COLUMNS, columns.next_power_of_two() as usize, 0.0)
             .into_iter()
@@ -287,6 +288,21 @@ fn table_atlas(packed: &[Vec<u32>], [columns, rows]: [u32; 2]) -> Vec<u32> {
         }
     }
     atlas
+}
+
+/// Cells of tables one below the other, a view angle a row, in as many columns as `across` says.
+fn in_rows<'a, T: Copy + 'a>(tables: impl Iterator<Item = &'a [T]>, across: usize, empty: T) -> Vec<T> {
+    let tables: Vec<_> = tables.collect();
+    let width = ROWS * COLUMNS;
+    let mut out = vec![empty; across * width * VIEW_ANGLES * tables.len().min(TILES_A_COLUMN)];
+    for (i, cells) in tables.into_iter().enumerate() {
+        let (column, place) = (i / TILES_A_COLUMN, i % TILES_A_COLUMN);
+        for (angle, cells) in cells.chunks_exact(width).enumerate() {
+            let at = ((place * VIEW_ANGLES + angle) * across + column) * width;
+            out[at..at + width].copy_from_slice(cells);
+        }
+    }
+    out
 }
 
 /// Tiles of `rows x columns`, one a view angle, side by side; tables one below the other, in as many columns as `across` says.
@@ -382,6 +398,18 @@ mod tests {
             }
         }
         assert_eq!(place(0, 5, 256), None);
+    }
+
+    #[test]
+    fn cells_of_an_angle_lie_together() {
+        let table = |first: usize| -> Vec<usize> { (0..VIEW_ANGLES * ROWS * COLUMNS).map(|i| first + i).collect() };
+        let tables: Vec<_> = (0..TILES_A_COLUMN + 1).map(|i| table(i * 1_000_000)).collect();
+        let atlas = in_rows(tables.iter().map(Vec::as_slice), 2, 0);
+        let width = ROWS * COLUMNS;
+        let at = |x: usize, y: usize| atlas[y * 2 * width + x];
+        assert_eq!((at(0, 0), at(5, 0), at(0, 1), at(3, VIEW_ANGLES)), (0, 5, width, 1_000_003));
+        // The last table begins the second column.
+        assert_eq!((at(width, 0), at(width + 7, 2)), (64_000_000, 64_000_007 + 2 * width));
     }
 
     #[test]
