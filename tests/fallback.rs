@@ -1,7 +1,12 @@
 //! Where most samples would be shaded anyway, the prediction from one block in sixteen turns the rest of it off.
 
+mod common;
 #[path = "support/levels.rs"]
 mod support;
+
+use common::assert_clean;
+use common::rig::Rig;
+use passband::offline::builtin;
 
 use passband::offline::levels;
 use passband::offline::session::Session;
@@ -67,4 +72,22 @@ fn the_forecast_is_close_to_the_prediction() {
         assert!((share - mean).abs() < 0.06, "{rate}: {share} of {mean}");
     }
     assert!(kinds[0] > 1 && kinds[1] > 1, "{kinds:?}");
+}
+
+#[test]
+fn a_resized_renderer_falls_back_over_its_new_extent() {
+    let mut rig = Rig::new();
+    let draws = [rig.draw(&builtin::mesh("sphere", 32).unwrap(), 0)];
+    let images = [config(Rate::Full, None), config(Rate::Bandwidth, Some(1000.0))].map(|config| {
+        let mut renderer = rig.renderer(&Config { extent: [24, 16], ..config });
+        rig.frame(&mut renderer, &draws);
+        let bag = renderer.resize([203, 117], &mut rig.memory).unwrap();
+        // SAFETY: every submission is waited for.
+        unsafe { bag.free(&rig.gpu.device, &mut rig.memory) };
+        let image = rig.frame(&mut renderer, &draws);
+        rig.destroy(renderer);
+        image
+    });
+    assert!(images[0].iter().any(|texel| texel[0] > 0.0) && images[0] == images[1]);
+    assert_clean(&rig.close());
 }

@@ -51,6 +51,7 @@ struct Push {
     samples_per_cycle: f32,
     coarsest: i32,
     stride: i32,
+    /// Groups across of the list of all samples, which only the forecast writes: extents change without the pass.
     full: u32,
 }
 
@@ -118,7 +119,7 @@ impl Bandwidth {
             samples_per_cycle: rate,
             coarsest: config.coarsest() as i32,
             stride: 1,
-            full: config.extent[0].saturating_mul(config.samples_per_side).div_ceil(8),
+            full: 0,
         };
         Ok(Self { pipelines: [make(0)?, make(1)?], push })
     }
@@ -159,7 +160,12 @@ impl Bandwidth {
             Resource::Buffer(io.forecast),
         ];
         let pipeline = &self.pipelines[usize::from(io.light_count > 0)];
-        pipeline.bind(rec, io.bridge, &resources, &Push { stride: STRIDE as i32, ..self.push });
+        pipeline.bind(
+            rec,
+            io.bridge,
+            &resources,
+            &Push { stride: STRIDE as i32, full: groups(io.level.extent(), 8)[0], ..self.push },
+        );
         pipeline.dispatch(rec, groups(io.prediction.extent(), STRIDE));
         // Where many samples are to be shaded, nothing follows: finding the others would take longer than they do.
         rec.buffer(io.forecast, Access::INDIRECT);
