@@ -12,7 +12,7 @@ use ash::vk;
 
 /// Passes of the frame.
 pub(crate) struct Passes {
-    pub environment_bandwidth: environment_bandwidth::EnvironmentBandwidth,
+    pub environment_bandwidth: Option<environment_bandwidth::EnvironmentBandwidth>,
     pub gbuffer: Option<GBuffer>,
     pub curvature: Option<curvature::Curvature>,
     pub bandwidth: Option<bandwidth::Bandwidth>,
@@ -33,14 +33,14 @@ impl Passes {
             GBufferSource::Host { .. } => None,
         };
         p.bridge.gbuffer = layout(&gbuffer, config);
-        let top = config.coarsest();
+        let (top, predicted) = (config.coarsest(), config.rate == Rate::Bandwidth);
         Ok(Self {
-            environment_bandwidth: environment_bandwidth::EnvironmentBandwidth::new(&mut p)?,
+            environment_bandwidth: predicted.then(|| environment_bandwidth::EnvironmentBandwidth::new(&mut p)).transpose()?,
             gbuffer,
             curvature: config.curvature.then(|| curvature::Curvature::new(&mut p)).transpose()?,
-            bandwidth: (config.rate == Rate::Bandwidth).then(|| bandwidth::Bandwidth::new(&mut p, config)).transpose()?,
+            bandwidth: predicted.then(|| bandwidth::Bandwidth::new(&mut p, config)).transpose()?,
             pyramid: (top > 0).then(|| pyramid::Pyramid::new(&mut p, top)).transpose()?,
-            classify: classify::Classify::new(&mut p, top, config.rate == Rate::Bandwidth)?,
+            classify: classify::Classify::new(&mut p, top, predicted)?,
             shade: shade::Shade::new(&mut p, config, top > 0)?,
             upsample: (top > 0).then(|| upsample::Upsample::new(&mut p, top)).transpose()?,
             resolve: resolve::Resolve::new(&mut p)?,
@@ -49,7 +49,9 @@ impl Passes {
     }
 
     pub fn retire(self, bag: &mut Retired) {
-        self.environment_bandwidth.retire(bag);
+        if let Some(pass) = self.environment_bandwidth {
+            pass.retire(bag);
+        }
         if let Some(pass) = self.gbuffer {
             pass.retire(bag);
         }

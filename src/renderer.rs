@@ -117,20 +117,19 @@ impl Renderer {
         map: &LatLong,
         memory: &mut dyn HostAllocator,
     ) -> Result<Retired> {
-        let pass = &self.passes.environment_bandwidth;
-        let bandwidth = Some((pass, &self.samplers));
-        let upload = Build::run(&self.cx, memory, |build| EnvironmentUpload::new(build, map, bandwidth))?;
+        let bandwidth = self.passes.environment_bandwidth.as_ref();
+        let upload = Build::run(&self.cx, memory, |build| EnvironmentUpload::new(build, map, bandwidth, &self.samplers))?;
         let mut bag = Retired::default();
         let mut rec = Recorder::new(&self.cx, cmd, 0, &mut self.states, None);
-        let fresh = upload.record(&mut rec, pass, &mut bag);
+        let fresh = upload.record(&mut rec, bandwidth, &mut bag);
         if let Some(former) = self.environment.replace(fresh) {
             former.retire(&mut self.states, &mut bag);
         }
         Ok(bag)
     }
 
-    /// Replaces the materials: builds their importance tables, compiles the pass that reads their maps and records the uploads. Draws and G-buffers name them by
-    /// index. The bag holds the staging memory and the former materials.
+    /// Replaces the materials: builds their importance tables, compiles the pass that reads their maps and records the uploads.
+    /// Draws and G-buffers name them by index. The bag holds the staging memory and the former materials.
     ///
     /// # Errors
     /// As [`Self::new`]; the former materials stay then.
@@ -180,7 +179,7 @@ impl Renderer {
             return Err(Error::CallOrder { called: "record", before });
         };
         if let GBufferInput::Draws(draws) = inputs.gbuffer {
-            gbuffer::check_materials(draws, materials.count())?;
+            gbuffer::check_materials(draws, materials.count)?;
         }
         if let Some(timings) = self.timer.begin_frame(&self.cx, cmd, inputs.slot)? {
             self.timings = Some(timings);

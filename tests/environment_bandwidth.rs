@@ -9,11 +9,11 @@ use passband::offline::session::Session;
 use passband::offline::world::{Camera, EnvironmentLight, Material, World};
 use passband::reflectance::{Ggx, Model};
 use passband::sampling::{LatLong, sobol};
-use passband::{Config, Requirements, glam};
+use passband::{Config, Rate, Requirements, glam};
 
 /// The device's bandwidth of `map`, row-major, and its columns.
 fn on_device(map: &LatLong) -> (Vec<f32>, usize) {
-    let config = Config::new([8, 8]);
+    let config = Config { rate: Rate::Bandwidth, ..Config::new([8, 8]) };
     let options = Options { device: Some("llvmpipe".into()), validate: true };
     let headless = Headless::new(&options, &Requirements::of(&config)).unwrap();
     let camera = Camera { position: DVec3::Z, target: DVec3::ZERO, up: DVec3::Y, fov_y: 40.0 };

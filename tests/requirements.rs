@@ -6,12 +6,13 @@ use common::assert_clean;
 use common::rig::{Rig, Target, grey};
 use passband::ash::vk;
 use passband::offline::builtin;
-use passband::reflectance::{Ggx, Model};
+use passband::reflectance::{Ggx, Lobe, Model, Vmf};
 use passband::sampling::LatLong;
 use passband::{
     Config, Draw, EnvironmentUse, Error, FrameInputs, GBufferInput, GBufferSource, Host, ImageRef, Material, Output, Renderer,
     Requirements, Retired, Transfer, View,
 };
+use std::sync::Arc;
 
 fn config() -> Config {
     Config { directions: 4, ..Config::new([24, 16]) }
@@ -254,6 +255,29 @@ fn impossible_materials_and_environments_are_refused() {
         ((), Retired::default())
     });
     assert_eq!(rig.memory.live.len(), live);
+    rig.destroy(renderer);
+    assert_clean(&rig.close());
+}
+
+#[test]
+fn the_lobes_of_a_material_are_no_materials() {
+    let mut rig = Rig::new();
+    let mut renderer = rig.renderer(&config());
+    let draw = rig.draw(&builtin::mesh("sphere", 16).unwrap(), 0);
+    let lobe = Lobe { mu: glam::DVec3::Z, kappa: 20.0, weight: 0.5 };
+    let vmf = Model::Vmf(Arc::new(Vmf::new(&[lobe, lobe]).unwrap()));
+    let target = Target::new(&mut rig, config().extent);
+    rig.submit(|cmd, _, memory| {
+        // SAFETY: the command buffer is recording.
+        let bag = unsafe { renderer.record_materials(cmd, &[vmf.into()], memory) }.unwrap();
+        let draws = [Draw { material: 1, ..draw }];
+        // SAFETY: as above.
+        assert_invalid(unsafe { renderer.record(cmd, &target.inputs(0, &draws)) }, "draws[0].material");
+        // SAFETY: as above.
+        unsafe { renderer.record(cmd, &target.inputs(0, &[draw])) }.unwrap();
+        ((), bag)
+    });
+    assert!(target.read(&mut rig).iter().any(|texel| texel[0] > 0.0));
     rig.destroy(renderer);
     assert_clean(&rig.close());
 }

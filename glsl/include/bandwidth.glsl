@@ -22,11 +22,6 @@ float image_bandwidth(int operator, float light, float lobe, vec2 curvatures, fl
     return max(along.x, along.y) * pixel;
 }
 
-// What a texture of `bandwidth` cycles/m adds to it.
-float texture_image_bandwidth(float bandwidth, float distance, float cosine, float pixel) {
-    return bandwidth * distance / max(cosine, BANDWIDTH_LEAST_COSINE) * pixel;
-}
-
 // The largest angle in radians between the rays of neighbouring pixels at `ray` on the image plane at distance 1, of pixels
 // `pixel_step` wide and high there.
 float pixel_angle(vec2 ray, vec2 pixel_step) {

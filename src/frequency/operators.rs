@@ -54,11 +54,6 @@ impl Operator {
     }
 }
 
-/// What a texture of `bandwidth` cycles/m adds to the image's, in cycles/pixel.
-pub fn texture(bandwidth: f64, surface: &Surface) -> f64 {
-    bandwidth * surface.distance / surface.cosine.max(LEAST_COSINE) * surface.pixel
-}
-
 /// The largest angle in radians between the rays of neighbouring pixels at `ray` = (x, y) on the image plane at distance 1, of
 /// pixels `step` wide and high there. Equation 5 takes field of view over pixels for it, which is 10 % less in the middle of
 /// a view of 60 degrees.

@@ -8,6 +8,7 @@ pub mod context;
 pub mod image;
 pub mod memory;
 pub mod pipeline;
+pub mod raster;
 pub mod recorder;
 pub mod requirements;
 pub mod retire;

@@ -11,7 +11,7 @@ use bytemuck::NoUninit;
 use std::collections::HashMap;
 use std::ffi::CStr;
 
-const MAIN: &CStr = c"main";
+pub(super) const MAIN: &CStr = c"main";
 
 /// The shader interface of a compute pass, as Rust sees it; a test holds it against the SPIR-V.
 #[derive(Clone, Copy, Debug)]
@@ -53,7 +53,7 @@ impl Modules {
     }
 
     /// Creates the module; the caller destroys it after pipeline creation.
-    fn create(&self, build: &mut Build<'_>, name: &str) -> Result<vk::ShaderModule> {
+    pub(super) fn create(&self, build: &mut Build<'_>, name: &str) -> Result<vk::ShaderModule> {
         let words = self.words(name)?;
         if words.first() != Some(&0x0723_0203) {
             return Err(Error::Shader { name: name.into(), reason: "does not start with the SPIR-V magic number".into() });
@@ -322,104 +322,5 @@ impl ComputePipeline {
         bag.push(Handle::PipelineLayout(self.layout));
         self.sets.retire(bag);
         self.set_layouts.into_iter().for_each(|l| bag.push(Handle::SetLayout(l)));
-    }
-}
-
-/// A graphics pipeline for dynamic rendering with per-pass push constants and no descriptors.
-pub(crate) struct RasterPipeline {
-    pub pipeline: vk::Pipeline,
-    pub layout: vk::PipelineLayout,
-}
-
-impl RasterPipeline {
-    /// `vertices` are streams, binding and location i of format i, whose strides are bound with them.
-    pub fn new(
-        build: &mut Build<'_>,
-        modules: &Modules,
-        name: &str,
-        push_bytes: u32,
-        vertices: &[vk::Format],
-        colors: &[vk::Format],
-        depth: vk::Format,
-    ) -> Result<Self> {
-        let stages = vk::ShaderStageFlags::VERTEX | vk::ShaderStageFlags::FRAGMENT;
-        let push = [vk::PushConstantRange::default().stage_flags(stages).size(push_bytes)];
-        let info = vk::PipelineLayoutCreateInfo::default().push_constant_ranges(&push);
-        // SAFETY: the device is alive.
-        let layout = unsafe { build.cx.device.create_pipeline_layout(&info, None) }.named("vkCreatePipelineLayout")?;
-        build.track(layout, Handle::PipelineLayout);
-
-        let vertex = modules.create(build, &format!("{name}.vert"))?;
-        let fragment = match modules.create(build, &format!("{name}.frag")) {
-            Ok(module) => module,
-            Err(error) => {
-                // SAFETY: never used.
-                unsafe { build.cx.device.destroy_shader_module(vertex, None) };
-                return Err(error);
-            }
-        };
-        let stage = |module, stage| vk::PipelineShaderStageCreateInfo::default().stage(stage).module(module).name(MAIN);
-        let stages = [stage(vertex, vk::ShaderStageFlags::VERTEX), stage(fragment, vk::ShaderStageFlags::FRAGMENT)];
-        let (bindings, attributes): (Vec<_>, Vec<_>) = (0u32..)
-            .zip(vertices)
-            .map(|(i, &format)| {
-                (
-                    vk::VertexInputBindingDescription { binding: i, stride: 0, input_rate: vk::VertexInputRate::VERTEX },
-                    vk::VertexInputAttributeDescription { location: i, binding: i, format, offset: 0 },
-                )
-            })
-            .unzip();
-        let input = vk::PipelineVertexInputStateCreateInfo::default()
-            .vertex_binding_descriptions(&bindings)
-            .vertex_attribute_descriptions(&attributes);
-        let assembly = vk::PipelineInputAssemblyStateCreateInfo::default().topology(vk::PrimitiveTopology::TRIANGLE_LIST);
-        let viewport = vk::PipelineViewportStateCreateInfo::default().viewport_count(1).scissor_count(1);
-        let raster = vk::PipelineRasterizationStateCreateInfo::default()
-            .polygon_mode(vk::PolygonMode::FILL)
-            .cull_mode(vk::CullModeFlags::NONE)
-            .line_width(1.0);
-        let samples = vk::PipelineMultisampleStateCreateInfo::default().rasterization_samples(vk::SampleCountFlags::TYPE_1);
-        let test = vk::PipelineDepthStencilStateCreateInfo::default()
-            .depth_test_enable(true)
-            .depth_write_enable(true)
-            .depth_compare_op(vk::CompareOp::LESS);
-        let write = vk::PipelineColorBlendAttachmentState::default().color_write_mask(vk::ColorComponentFlags::RGBA);
-        let attachments = vec![write; colors.len()];
-        let blend = vk::PipelineColorBlendStateCreateInfo::default().attachments(&attachments);
-        let dynamic = vk::PipelineDynamicStateCreateInfo::default().dynamic_states(&[
-            vk::DynamicState::VIEWPORT,
-            vk::DynamicState::SCISSOR,
-            vk::DynamicState::VERTEX_INPUT_BINDING_STRIDE,
-        ]);
-        let mut rendering =
-            vk::PipelineRenderingCreateInfo::default().color_attachment_formats(colors).depth_attachment_format(depth);
-        let info = vk::GraphicsPipelineCreateInfo::default()
-            .push_next(&mut rendering)
-            .stages(&stages)
-            .vertex_input_state(&input)
-            .input_assembly_state(&assembly)
-            .viewport_state(&viewport)
-            .rasterization_state(&raster)
-            .multisample_state(&samples)
-            .depth_stencil_state(&test)
-            .color_blend_state(&blend)
-            .dynamic_state(&dynamic)
-            .layout(layout);
-        // SAFETY: all handles are alive; the modules are destroyed once, after use.
-        let created = unsafe {
-            let created = build.cx.device.create_graphics_pipelines(build.cx.pipeline_cache, &[info], None);
-            build.cx.device.destroy_shader_module(vertex, None);
-            build.cx.device.destroy_shader_module(fragment, None);
-            created
-        };
-        let pipeline = created.map_err(|(_, result)| result).named("vkCreateGraphicsPipelines")?[0];
-        build.track(pipeline, Handle::Pipeline);
-        build.cx.name(pipeline, name);
-        Ok(Self { pipeline, layout })
-    }
-
-    pub fn retire(self, bag: &mut Retired) {
-        bag.push(Handle::Pipeline(self.pipeline));
-        bag.push(Handle::PipelineLayout(self.layout));
     }
 }

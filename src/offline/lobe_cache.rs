@@ -1,11 +1,8 @@
-//! Lobe bandwidths kept on disk by the content of the model.
-//!
-//! A cache entry is the SHA-256 of what follows, and the texels as little-endian 32-bit floats.
+//! Lobe bandwidths kept on disk by the content of the model: an entry's content is their texels as little-endian 32-bit floats.
 
-use crate::offline::image_io::write_atomically;
+use crate::offline::cache;
 use crate::reflectance::{LobeBandwidth, MerlTable, Model};
 use sha2::{Digest, Sha256};
-use std::io::Write;
 use std::path::{Path, PathBuf};
 
 /// Changes with whatever changes the result for one model.
@@ -13,18 +10,18 @@ const VERSION: &[u8] = b"passband lobe bandwidth 1";
 
 /// The folder of the user's cache in which lobe bandwidths are kept; `None` on systems that have none.
 pub fn cache_folder() -> Option<PathBuf> {
-    dirs::cache_dir().map(|folder| folder.join("passband").join("lobes"))
+    cache::folder("lobes")
 }
 
-/// The lobe bandwidth of `model`, from `cache` if it is there; otherwise it is built and kept there, if that is possible.
-pub fn lobe_bandwidth(model: &Model, cache: Option<&Path>) -> LobeBandwidth {
-    let entry = cache.map(|folder| folder.join(format!("{}.lobes", key(model))));
-    if let Some(known) = entry.as_ref().and_then(|entry| from_bytes(&std::fs::read(entry).ok()?)) {
+/// The lobe bandwidth of `model`, from `folder` if it is there; otherwise it is built and kept there, if that is possible.
+pub fn lobe_bandwidth(model: &Model, folder: Option<&Path>) -> LobeBandwidth {
+    let entry = folder.map(|folder| folder.join(format!("{}.lobes", key(model))));
+    if let Some(known) = entry.as_ref().and_then(|entry| from_bytes(&cache::read(entry)?)) {
         return known;
     }
     let built = LobeBandwidth::build(model);
     if let Some(entry) = &entry {
-        keep(entry, &built);
+        cache::keep(entry, &to_bytes(&built));
     }
     built
 }
@@ -55,31 +52,12 @@ fn key(model: &Model) -> String {
     format!("{:x}", hash.finalize())
 }
 
-fn keep(entry: &Path, bandwidth: &LobeBandwidth) {
-    let Some(folder) = entry.parent() else { return };
-    let written = std::fs::create_dir_all(folder).map_err(|e| e.to_string());
-    let written = written.and_then(|()| {
-        let bytes = to_bytes(bandwidth);
-        write_atomically(entry, |file| file.write_all(&bytes)).map_err(|e| e.to_string())
-    });
-    if let Err(e) = written {
-        log::warn!("the lobe bandwidth is not kept: {e}");
-    }
-}
-
 fn to_bytes(bandwidth: &LobeBandwidth) -> Vec<u8> {
-    let content: Vec<u8> = bandwidth.texels().iter().flat_map(|b| b.to_le_bytes()).collect();
-    let mut bytes = Sha256::digest(&content).to_vec();
-    bytes.extend(content);
-    bytes
+    bandwidth.texels().iter().flat_map(|b| b.to_le_bytes()).collect()
 }
 
-/// Nothing unless the entry is whole.
-fn from_bytes(bytes: &[u8]) -> Option<LobeBandwidth> {
-    let (sum, content) = bytes.split_at_checked(32)?;
-    if Sha256::digest(content).as_slice() != sum {
-        return None;
-    }
+/// Nothing unless it has as many texels as it should.
+fn from_bytes(content: &[u8]) -> Option<LobeBandwidth> {
     LobeBandwidth::from_texels(content.as_chunks::<4>().0.iter().map(|b| f32::from_le_bytes(*b)).collect())
 }
 
@@ -97,22 +75,22 @@ mod tests {
     #[test]
     fn entries_are_used_and_damaged_ones_replaced() {
         let folder = tempfile::tempdir().unwrap();
-        let cache = folder.path().join("deep").join("cache");
-        let fresh = lobe_bandwidth(&ggx(0.3), Some(&cache));
-        let entry = cache.join(format!("{}.lobes", key(&ggx(0.3))));
+        let place = folder.path().join("deep").join("cache");
+        let fresh = lobe_bandwidth(&ggx(0.3), Some(&place));
+        let entry = place.join(format!("{}.lobes", key(&ggx(0.3))));
         let kept = std::fs::read(&entry).unwrap();
         // A valid entry of other content is believed: it is read, not computed.
         let other = LobeBandwidth::from_texels(vec![1.0; fresh.texels().len()]).unwrap();
-        std::fs::write(&entry, to_bytes(&other)).unwrap();
-        assert_eq!(lobe_bandwidth(&ggx(0.3), Some(&cache)), other);
+        cache::keep(&entry, &to_bytes(&other));
+        assert_eq!(lobe_bandwidth(&ggx(0.3), Some(&place)), other);
         let mut flipped = kept.clone();
         flipped[100] ^= 1;
         for damaged in [vec![], kept[..kept.len() / 2].to_vec(), flipped] {
             std::fs::write(&entry, damaged).unwrap();
-            assert_eq!(lobe_bandwidth(&ggx(0.3), Some(&cache)), fresh);
+            assert_eq!(lobe_bandwidth(&ggx(0.3), Some(&place)), fresh);
             assert_eq!(std::fs::read(&entry).unwrap(), kept, "rewritten");
         }
-        assert_eq!(std::fs::read_dir(&cache).unwrap().count(), 1, "nothing else is left there");
+        assert_eq!(std::fs::read_dir(&place).unwrap().count(), 1, "nothing else is left there");
         // A folder that cannot be does not matter.
         assert_eq!(lobe_bandwidth(&ggx(0.3), Some(&entry)), fresh);
     }

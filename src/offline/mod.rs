@@ -16,6 +16,7 @@ pub mod lobe_cache;
 pub mod mesh;
 pub mod metrics;
 pub mod rates;
+mod read_back;
 pub mod reference;
 pub mod render;
 pub mod scene;

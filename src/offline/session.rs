@@ -13,6 +13,7 @@ use crate::offline::error::{Error, Result};
 use crate::offline::headless::Headless;
 use crate::offline::lobe_cache;
 use crate::offline::mesh::Mesh;
+use crate::offline::read_back::copy_buffer;
 use crate::offline::world::{Camera, World};
 use crate::pass::PassContext;
 use crate::pass::probe::Probe;
@@ -87,8 +88,8 @@ pub type SetupTimes = Vec<(&'static str, f64)>;
 
 /// A renderer with a world's meshes, materials and environment on the device.
 pub struct Session {
-    headless: Headless,
-    renderer: Option<Renderer>,
+    pub(super) headless: Headless,
+    pub(super) renderer: Option<Renderer>,
     meshes: Vec<MeshBuffers>,
     shown: Shown,
     setup: SetupTimes,
@@ -313,73 +314,6 @@ impl Session {
         &self.headless
     }
 
-    /// The number of samples that the last frame shaded.
-    ///
-    /// # Errors
-    /// The device's.
-    pub fn shaded(&mut self) -> Result<u32> {
-        Ok(self.words("arguments")?.get(3).copied().unwrap_or(0))
-    }
-
-    /// The words of one of the renderer's own buffers after the last frame.
-    ///
-    /// # Errors
-    /// [`Error::Argument`] for a name that the configuration has no buffer of.
-    pub fn words(&mut self, name: &'static str) -> Result<Vec<u32>> {
-        let renderer = self.renderer.as_ref().ok_or_else(closed)?;
-        let buffer = renderer.buffer(name).ok_or_else(|| Error::argument("buffer", "one that the frame writes", name))?;
-        let bytes = self.read(buffer.size, |renderer, rec, target| {
-            if let Some(buffer) = renderer.buffer(name) {
-                copy_buffer(rec, buffer, target);
-            }
-        })?;
-        Ok(bytemuck::pod_collect_to_vec(&bytes))
-    }
-
-    /// The texels of one of the renderer's own images after the last frame, in its own format and extent.
-    ///
-    /// # Errors
-    /// [`Error::Argument`] for a name that the configuration has no image of.
-    pub fn image(&mut self, name: &str) -> Result<(Vec<u8>, vk::Format, [u32; 2])> {
-        let renderer = self.renderer.as_ref().ok_or_else(closed)?;
-        let image = renderer.image(name).ok_or_else(|| Error::argument("image", "one that the frame writes", name))?;
-        let (format, extent) = (image.desc.format, image.extent());
-        let (name, size) = (image.desc.name, image.desc.bytes());
-        let bytes = self.read(size, |renderer, rec, target| {
-            if let Some(image) = renderer.image(name) {
-                copy_image(rec, image, target);
-            }
-        })?;
-        Ok((bytes, format, extent))
-    }
-
-    /// What `record` copies into a host-visible buffer of `size` bytes.
-    fn read(&mut self, size: u64, record: impl FnOnce(&Renderer, &mut Recorder<'_>, &Buffer)) -> Result<Vec<u8>> {
-        let renderer = self.renderer.as_mut().ok_or_else(closed)?;
-        let mut target = None;
-        self.headless.submit(|cmd, memory| {
-            let usage = vk::BufferUsageFlags::TRANSFER_DST;
-            let buffer =
-                Build::run(renderer.context(), memory, |b| Buffer::new(b, "read-back", size, usage, Location::Readback))?;
-            renderer.copy_out(cmd, |renderer, rec| {
-                record(renderer, rec, &buffer);
-                rec.buffer(&buffer, Access::HOST_READ);
-                rec.flush();
-                rec.forget(buffer.handle);
-            });
-            target = Some(buffer);
-            Ok(Retired::default())
-        })?;
-        let buffer = target.ok_or_else(closed)?;
-        let bytes = buffer.bytes().to_vec();
-        let (host, memory) = self.headless.parts()?;
-        let mut bag = Retired::default();
-        buffer.retire(&mut bag);
-        // SAFETY: the submission was waited for.
-        unsafe { bag.free(host.device, memory) };
-        Ok(bytes)
-    }
-
     /// Validation messages so far.
     pub fn messages(&self) -> Vec<String> {
         self.headless.messages()
@@ -403,29 +337,7 @@ impl Drop for Session {
     }
 }
 
-fn copy_image(rec: &mut Recorder<'_>, image: &Image, target: &Buffer) {
-    rec.image(image, Access::TRANSFER_READ);
-    rec.buffer(target, Access::TRANSFER_WRITE);
-    rec.flush();
-    let [width, height] = image.extent();
-    let layers = vk::ImageSubresourceLayers { aspect_mask: image.desc.aspect(), layer_count: 1, ..Default::default() };
-    let extent = vk::Extent3D { width, height, depth: 1 };
-    let region = vk::BufferImageCopy { image_subresource: layers, image_extent: extent, ..Default::default() };
-    let layout = Access::TRANSFER_READ.layout;
-    // SAFETY: the command buffer is recording; the buffer holds the whole image.
-    unsafe { rec.cx.device.cmd_copy_image_to_buffer(rec.cmd, image.handle, layout, target.handle, &[region]) };
-}
-
-fn copy_buffer(rec: &mut Recorder<'_>, buffer: &Buffer, target: &Buffer) {
-    rec.buffer(buffer, Access::TRANSFER_READ);
-    rec.buffer(target, Access::TRANSFER_WRITE);
-    rec.flush();
-    let region = vk::BufferCopy { size: buffer.size, ..Default::default() };
-    // SAFETY: the command buffer is recording; both buffers have the source's size.
-    unsafe { rec.cx.device.cmd_copy_buffer(rec.cmd, buffer.handle, target.handle, &[region]) };
-}
-
-fn closed() -> Error {
+pub(super) fn closed() -> Error {
     Error::Device("the session is closed".into())
 }
 

@@ -23,10 +23,10 @@ const SLOTS_A_ROW: u32 = 1024;
 pub(crate) struct EnvironmentImages {
     /// RGBA32F: radiance; density over uv.
     pub map: Image,
-    /// RG32UI: alias alias of every row's texels, and the rows' own alias.
+    /// RGBA32UI: the alias table of the texels, as `src/sampling/alias.rs` packs it.
     pub alias: Image,
     /// R32F: cycles/radian around each direction, one value a 2x2 block of the map that is analysed; looked up with the map's
-    /// own coordinates, nearest. None if nobody asked.
+    /// own coordinates, nearest. None unless the frame predicts bandwidth.
     pub bandwidth: Option<Image>,
 }
 
@@ -39,7 +39,12 @@ pub(crate) struct EnvironmentUpload {
 
 impl EnvironmentUpload {
     /// With `bandwidth` the upload is followed by that pass.
-    pub fn new(build: &mut Build<'_>, map: &LatLong, bandwidth: Option<(&EnvironmentBandwidth, &Samplers)>) -> Result<Self> {
+    pub fn new(
+        build: &mut Build<'_>,
+        map: &LatLong,
+        bandwidth: Option<&EnvironmentBandwidth>,
+        samplers: &Samplers,
+    ) -> Result<Self> {
         // Its largest sum over texels must stay finite in 32 bits.
         let brightest = map.texels().iter().flatten().copied().fold(0.0, f32::max);
         if brightest > 1e30 {
@@ -56,20 +61,17 @@ impl EnvironmentUpload {
         let alias_desc =
             desc("environment alias", vk::Format::R32G32B32A32_UINT, [SLOTS_A_ROW, slots.len() as u32 / SLOTS_A_ROW]);
         let upload = ImageUpload::new(build, radiance_desc, bytemuck::cast_slice(&radiance))?;
-        let bandwidth = match bandwidth {
-            Some((pass, samplers)) => Some(pass.prepare(build, samplers, map, &upload.image)?),
-            None => None,
-        };
+        let bandwidth = bandwidth.map(|pass| pass.prepare(build, samplers, map, &upload.image)).transpose()?;
         Ok(Self { map: upload, alias: ImageUpload::new(build, alias_desc, bytemuck::cast_slice(&slots))?, bandwidth })
     }
 
-    /// Needs the pass if it was created with it.
-    pub fn record(self, rec: &mut Recorder<'_>, pass: &EnvironmentBandwidth, bag: &mut Retired) -> EnvironmentImages {
+    /// With the pass that it was created with.
+    pub fn record(self, rec: &mut Recorder<'_>, pass: Option<&EnvironmentBandwidth>, bag: &mut Retired) -> EnvironmentImages {
         rec.begin(NAME);
         let (map, alias) = (self.map.record(rec, bag), self.alias.record(rec, bag));
         rec.end();
         let io = environment_bandwidth::Io { map: &map };
-        let bandwidth = self.bandwidth.map(|work| pass.record(rec, &io, work, bag));
+        let bandwidth = self.bandwidth.zip(pass).map(|(work, pass)| pass.record(rec, &io, work, bag));
         EnvironmentImages { map, alias, bandwidth }
     }
 }

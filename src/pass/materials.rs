@@ -11,14 +11,12 @@ use crate::gpu::sampler::Samplers;
 use crate::gpu::upload::{BufferUpload, ImageUpload};
 use crate::material::Material;
 use crate::pass::maps::{MapImages, MapsUpload, Uses};
-use crate::reflectance::importance::{COLUMNS, DENSITY_COLUMNS, DENSITY_ROWS, ImportanceTable, ROWS, VIEW_ANGLES};
 use crate::reflectance::ladder::{Ladder, own_square};
 use crate::reflectance::merl::{PHI_DIFF, THETA_DIFF, THETA_HALF};
-use crate::reflectance::{Lobe, LobeBandwidth, MerlTable, Model, bandwidth};
+use crate::reflectance::{Lobe, MerlTable, Model, atlas, bandwidth};
 use ash::vk;
 use bytemuck::{Pod, Zeroable};
 use glam::DVec3;
-use half::f16;
 use std::sync::Arc;
 
 /// Pass, label and set-up time name.
@@ -35,9 +33,6 @@ pub const BRIDGE: [vk::DescriptorType; 4] = [
 /// Materials of a frame.
 pub const MAX_MATERIALS: usize = 64;
 
-/// Tables one below the other in the importance atlas: on every device, images may have 4096 rows.
-const TILES_A_COLUMN: usize = 64;
-
 /// Mirrors `MaterialRecord` in `glsl/bridge/materials.glsl`.
 #[repr(C)]
 #[derive(Clone, Copy, Pod, Zeroable)]
@@ -51,6 +46,8 @@ struct Record {
 
 /// What the shaders read.
 pub(crate) struct MaterialImages {
+    /// Materials that draws may name: fewer than records, of which lobes have some.
+    pub count: u32,
     records: Buffer,
     tables: Image,
     importance: Image,
@@ -62,6 +59,7 @@ pub(crate) struct MaterialImages {
 
 /// Created and filled, not yet recorded.
 pub(crate) struct MaterialsUpload {
+    count: u32,
     records: BufferUpload,
     tables: ImageUpload,
     importance: ImageUpload,
@@ -154,39 +152,6 @@ fn records(materials: &[Material], tables: &Tables<'_>, importance: &[[f32; 4]],
     records
 }
 
-/// The tables of all ladders one after the other, on as many threads as there are processors.
-fn importance_tables(materials: &[Material], ladders: &[Ladder]) -> Vec<ImportanceTable> {
-    let all: Vec<_> = materials.iter().zip(ladders).flat_map(|(m, l)| (0..l.steps()).map(move |i| (m, l, i))).collect();
-    let threads = std::thread::available_parallelism().map_or(1, usize::from);
-    let build = |part: &[(&Material, &Ladder, usize)]| part.iter().map(|(m, l, i)| l.table(m, *i)).collect::<Vec<_>>();
-    std::thread::scope(|scope| {
-        let parts = all.chunks(all.len().div_ceil(threads).max(1));
-        let running: Vec<_> = parts.map(|part| (part, scope.spawn(move || build(part)))).collect();
-        running.into_iter().flat_map(|(part, thread)| thread.join().unwrap_or_else(|_| build(part))).collect()
-    })
-}
-
-/// The lobes' bandwidths of all materials, one strip below the other; each reflectance is analysed once.
-fn lobe_bandwidths(materials: &[Material]) -> Vec<f32> {
-    let mut known: Vec<(*const u8, Arc<LobeBandwidth>)> = Vec::new();
-    let mut texels = Vec::with_capacity(materials.len() * bandwidth::WIDTH * bandwidth::SIDE);
-    for material in materials {
-        let key: *const u8 = match &material.model {
-            Model::Table(table) => Arc::as_ptr(table).cast(),
-            Model::Turned(turned) => Arc::as_ptr(turned).cast(),
-            Model::Ggx(_) | Model::BlinnPhong(_) | Model::Vmf(_) => std::ptr::null(),
-        };
-        let found = known.iter().find(|k| k.0 == key && !key.is_null()).map(|k| Arc::clone(&k.1));
-        let lobes = found.or_else(|| material.lobe_bandwidth.clone()).unwrap_or_else(|| {
-            let built = Arc::new(LobeBandwidth::build(&material.model));
-            known.push((key, Arc::clone(&built)));
-            built
-        });
-        texels.extend_from_slice(lobes.texels());
-    }
-    texels
-}
-
 impl MaterialsUpload {
     /// `widened` says whether a filter widens lobes, `predicted` whether the frame predicts bandwidth.
     pub fn new(build: &mut Build<'_>, materials: &[Material], widened: bool, predicted: bool) -> Result<Self> {
@@ -201,40 +166,28 @@ impl MaterialsUpload {
         }
         let tables = Tables::of(materials);
         let limit = build.cx.limits.max_image_dimension3_d;
-        let atlas = place(0, tables.all.len(), limit)
+        let size = place(0, tables.all.len(), limit)
             .ok_or_else(|| Error::invalid("materials", format!("tables that fit a 3-D image of side {limit}"), tables.all.len()))?
             .1;
         let packed: Vec<_> = tables.all.iter().map(|(table, scale)| table.packed_at(*scale)).collect();
         let ladders: Vec<_> = materials.iter().map(|m| Ladder::of(m, widened)).collect();
         let firsts = ladders.iter().scan(0, |next, ladder| Some(std::mem::replace(next, *next + ladder.steps())));
         let places: Vec<_> = ladders.iter().zip(firsts).map(|(ladder, first)| ladder.record(first)).collect();
-        let mut records = records(materials, &tables, &places, atlas[0]);
-        let lobes = predicted.then(|| lobe_bandwidths(materials));
+        let mut records = records(materials, &tables, &places, size[0]);
+        let lobes = predicted.then(|| atlas::lobe_bandwidths(materials));
         if predicted {
             let bandwidths = materials.iter().map(|m| m.texture_bandwidth() as f32);
             records.iter_mut().zip(bandwidths).for_each(|(record, b)| record.texture_bandwidth = [b; 4]);
         }
-        let importance = importance_tables(materials, &ladders);
+        let importance = atlas::importance_tables(materials, &ladders);
         let image = |name, format, extent| ImageDesc::new(name, format, extent, vk::ImageUsageFlags::SAMPLED);
-        let angles = VIEW_ANGLES as u32;
-        let columns = importance.len().div_ceil(TILES_A_COLUMN) as u32;
-        let count = importance.len().min(TILES_A_COLUMN) as u32;
-        let table_extent = [PHI_DIFF as u32, THETA_DIFF as u32 * atlas[0], THETA_HALF as u32 * atlas[1]];
-        // One angle's cells are one row of texels: what a pixel draws from lies together.
-        let cell_extent = [columns * (ROWS * COLUMNS) as u32, angles * count, 1];
-        // A power of two on both sides: coordinates are exact, so that a clamp at a tile's edge keeps its neighbour out.
-        let density_extent =
-            [columns.next_power_of_two() * angles * DENSITY_COLUMNS as u32, DENSITY_ROWS as u32 * count.next_power_of_two(), 1];
-        let texels = table_atlas(&packed, atlas);
-        let cells = in_rows(importance.iter().map(ImportanceTable::cells), columns as usize, [0.0; 4]);
-        let tiles = importance.iter().map(ImportanceTable::density_texels);
-        let mut density: Vec<f16> = in_columns(tiles, DENSITY_ROWS, DENSITY_COLUMNS, columns.next_power_of_two() as usize, 0.0)
-            .into_iter()
-            .map(f16::from_f32)
-            .collect();
-        density.resize(density_extent[0] as usize * density_extent[1] as usize, f16::ZERO);
+        let table_extent = [PHI_DIFF as u32, THETA_DIFF as u32 * size[0], THETA_HALF as u32 * size[1]];
+        let texels = atlas::tables(&packed, size);
+        let (cells, cell_extent) = atlas::cells(&importance);
+        let (density, density_extent) = atlas::density(&importance);
         let cast = bytemuck::cast_slice::<u32, u8>;
         Ok(Self {
+            count: materials.len() as u32,
             records: BufferUpload::new(build, "materials", vk::BufferUsageFlags::STORAGE_BUFFER, bytemuck::cast_slice(&records))?,
             tables: ImageUpload::new(build, image("tables", vk::Format::E5B9G9R9_UFLOAT_PACK32, table_extent), cast(&texels))?,
             importance: ImageUpload::new(
@@ -265,6 +218,7 @@ impl MaterialsUpload {
 
     pub fn record(self, rec: &mut Recorder<'_>, bag: &mut Retired) -> MaterialImages {
         MaterialImages {
+            count: self.count,
             records: self.records.record(rec, bag),
             tables: self.tables.record(rec, bag),
             importance: self.importance.record(rec, bag),
@@ -275,66 +229,7 @@ impl MaterialsUpload {
     }
 }
 
-/// Tables (phi_d fastest, then theta_d, then theta_h) laid side by side in theta_d and theta_h.
-fn table_atlas(packed: &[Vec<u32>], [columns, rows]: [u32; 2]) -> Vec<u32> {
-    let (columns, rows) = (columns as usize, rows as usize);
-    let slice = THETA_DIFF * PHI_DIFF;
-    let mut atlas = vec![0; columns * rows * slice * THETA_HALF];
-    for (i, table) in packed.iter().enumerate() {
-        let (column, row) = (i % columns, i / columns);
-        for (theta_h, texels) in table.chunks_exact(slice).enumerate() {
-            let at = ((row * THETA_HALF + theta_h) * columns + column) * slice;
-            atlas[at..at + slice].copy_from_slice(texels);
-        }
-    }
-    atlas
-}
-
-/// Cells of tables one below the other, a view angle a row, in as many columns as `across` says.
-fn in_rows<'a, T: Copy + 'a>(tables: impl Iterator<Item = &'a [T]>, across: usize, empty: T) -> Vec<T> {
-    let tables: Vec<_> = tables.collect();
-    let width = ROWS * COLUMNS;
-    let mut out = vec![empty; across * width * VIEW_ANGLES * tables.len().min(TILES_A_COLUMN)];
-    for (i, cells) in tables.into_iter().enumerate() {
-        let (column, place) = (i / TILES_A_COLUMN, i % TILES_A_COLUMN);
-        for (angle, cells) in cells.chunks_exact(width).enumerate() {
-            let at = ((place * VIEW_ANGLES + angle) * across + column) * width;
-            out[at..at + width].copy_from_slice(cells);
-        }
-    }
-    out
-}
-
-/// Tiles of `rows x columns`, one a view angle, side by side; tables one below the other, in as many columns as `across` says.
-fn in_columns<'a, T: Copy + 'a>(
-    tables: impl Iterator<Item = &'a [T]>,
-    rows: usize,
-    columns: usize,
-    across: usize,
-    empty: T,
-) -> Vec<T> {
-    let tables: Vec<_> = tables.collect();
-    let down = tables.len().min(TILES_A_COLUMN);
-    let width = VIEW_ANGLES * columns;
-    let mut out = vec![empty; across * width * rows * down];
-    for (i, tiles) in tables.into_iter().enumerate() {
-        let (column, place) = (i / TILES_A_COLUMN, i % TILES_A_COLUMN);
-        for (angle, tile) in tiles.chunks_exact(rows * columns).enumerate() {
-            for (row, cells) in tile.chunks_exact(columns).enumerate() {
-                let at = (place * rows + row) * across * width + column * width + angle * columns;
-                out[at..at + columns].copy_from_slice(cells);
-            }
-        }
-    }
-    out
-}
-
 impl MaterialImages {
-    /// Materials that draws may name.
-    pub fn count(&self) -> u32 {
-        (self.records.size / size_of::<Record>() as u64) as u32
-    }
-
     /// Declares everything read by the pass that is open.
     pub fn sampled(&self, rec: &mut Recorder<'_>) {
         rec.buffer(&self.records, Access::COMPUTE_READ);
@@ -398,30 +293,5 @@ mod tests {
             }
         }
         assert_eq!(place(0, 5, 256), None);
-    }
-
-    #[test]
-    fn cells_of_an_angle_lie_together() {
-        let table = |first: usize| -> Vec<usize> { (0..VIEW_ANGLES * ROWS * COLUMNS).map(|i| first + i).collect() };
-        let tables: Vec<_> = (0..TILES_A_COLUMN + 1).map(|i| table(i * 1_000_000)).collect();
-        let atlas = in_rows(tables.iter().map(Vec::as_slice), 2, 0);
-        let width = ROWS * COLUMNS;
-        let at = |x: usize, y: usize| atlas[y * 2 * width + x];
-        assert_eq!((at(0, 0), at(5, 0), at(0, 1), at(3, VIEW_ANGLES)), (0, 5, width, 1_000_003));
-        // The last table begins the second column.
-        assert_eq!((at(width, 0), at(width + 7, 2)), (64_000_000, 64_000_007 + 2 * width));
-    }
-
-    #[test]
-    fn tables_stand_in_columns() {
-        let table = |first: usize| -> Vec<usize> { (0..VIEW_ANGLES * 4).map(|i| first + i).collect() };
-        let tables: Vec<_> = (0..TILES_A_COLUMN + 1).map(|i| table(i * 1000)).collect();
-        let atlas = in_columns(tables.iter().map(Vec::as_slice), 2, 2, 2, 0);
-        let width = 2 * VIEW_ANGLES * 2;
-        let at = |x: usize, y: usize| atlas[y * width + x];
-        // Row 1, column 0 of angle 1's tile of table 0; of the last table, which begins the second column.
-        assert_eq!((at(0, 0), at(1, 0), at(0, 1), at(2, 0), at(2, 1)), (0, 1, 2, 4, 6));
-        assert_eq!((at(VIEW_ANGLES * 2, 0), at(VIEW_ANGLES * 2 + 2, 1)), (64_000, 64_006));
-        assert_eq!(at(0, 2), 1000);
     }
 }

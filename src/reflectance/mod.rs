@@ -8,6 +8,7 @@ use half_row::Rows;
 use std::sync::Arc;
 
 pub mod analysis;
+pub(crate) mod atlas;
 pub mod bake;
 pub mod bandwidth;
 pub mod blinn_phong;

@@ -1,5 +1,5 @@
 #version 460
-// Operators, what a texture adds, pixel angles and levels.
+// Operators, pixel angles and levels.
 #include "entry.glsl"
 #include "bandwidth.glsl"
 
@@ -7,6 +7,5 @@
 vec4 probe(uint i) {
     vec4 a = uintBitsToFloat(entries[i & ~1u]), b = uintBitsToFloat(entries[i | 1u]);
     float image = image_bandwidth(int(entries[i | 1u].w), a.x, a.y, a.zw, b.x, b.y, b.z);
-    float spatial = texture_image_bandwidth(a.x, b.x, b.y, b.z);
-    return vec4(image, spatial, pixel_angle(a.zw, vec2(b.z, 0.5 * b.z)), float(bandwidth_level(image, 4.0, -2, 5)));
+    return vec4(image, pixel_angle(a.zw, vec2(b.z, 0.5 * b.z)), float(bandwidth_level(image, 4.0, -2, 5)), 0.0);
 }

@@ -1,21 +1,20 @@
 //! Converged images, kept on disk by the content of what they show.
 //!
 //! An image is the mean of many full-rate frames with independent seeds, in two halves whose difference says how noisy it is.
-//! An entry of the cache is: the SHA-256 of what follows; width, height and directions a frame; for each half its number of
-//! frames and its mean `R G B A`; all little-endian and of 32 bits. An entry is written every half minute and can be continued.
+//! An entry's content is: width, height and directions a frame; for each half its number of frames and its mean `R G B A`; all
+//! little-endian and of 32 bits. An entry is written every half minute and can be continued.
 
+use crate::Requirements;
 use crate::offline::bench::quality::{self, Frame, Noise};
+use crate::offline::cache;
 use crate::offline::error::Result;
 use crate::offline::headless::{Headless, Options};
-use crate::offline::image_io::write_atomically;
 use crate::offline::metrics::Picture;
 use crate::offline::render::Settings;
 use crate::offline::session::Session;
 use crate::offline::world::World;
-use crate::{Requirements, offline};
 use sha2::{Digest, Sha256};
 use std::fmt::Write as _;
-use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
@@ -32,7 +31,7 @@ const SAVE_EVERY: Duration = Duration::from_secs(30);
 
 /// The folder of the user's cache in which references are kept; `None` on systems that have none.
 pub fn cache_folder() -> Option<PathBuf> {
-    dirs::cache_dir().map(|folder| folder.join("passband").join("reference"))
+    cache::folder("reference")
 }
 
 /// When an image is good enough.
@@ -133,18 +132,11 @@ impl Converged {
         let half =
             |half: &Half| std::iter::once(half.frames).chain(half.mean().into_iter().map(f32::to_bits)).collect::<Vec<_>>();
         let words = head.into_iter().chain(self.halves.iter().flat_map(half));
-        let content: Vec<u8> = words.flat_map(u32::to_le_bytes).collect();
-        let mut bytes = Sha256::digest(&content).to_vec();
-        bytes.extend(content);
-        bytes
+        words.flat_map(u32::to_le_bytes).collect()
     }
 
-    /// Nothing unless the entry is whole and of the frames that `new` would make.
-    fn from_bytes(bytes: &[u8], new: &Self) -> Option<Self> {
-        let (sum, content) = bytes.split_at_checked(32)?;
-        if Sha256::digest(content).as_slice() != sum {
-            return None;
-        }
+    /// Nothing unless the entry is of the frames that `new` would make.
+    fn from_bytes(content: &[u8], new: &Self) -> Option<Self> {
         let words: Vec<u32> = content.as_chunks::<4>().0.iter().map(|word| u32::from_le_bytes(*word)).collect();
         let (head, rest) = words.split_first_chunk::<3>()?;
         let count = 1 + 4 * new.extent[0] as usize * new.extent[1] as usize;
@@ -175,12 +167,12 @@ pub fn converge(
     device: &Options,
     extent: [u32; 2],
     goal: &Goal,
-    cache: Option<&Path>,
+    folder: Option<&Path>,
     progress: &mut dyn FnMut(u64, u64),
 ) -> Result<Converged> {
     let mut image = Converged::new(extent);
-    let entry = cache.map(|folder| folder.join(format!("{}.reference", key(world, &image))));
-    if let Some(known) = entry.as_ref().and_then(|entry| Converged::from_bytes(&std::fs::read(entry).ok()?, &image)) {
+    let entry = folder.map(|folder| folder.join(format!("{}.reference", key(world, &image))));
+    if let Some(known) = entry.as_ref().and_then(|entry| Converged::from_bytes(&cache::read(entry)?, &image)) {
         image = known;
     }
     let mut session = None;
@@ -196,20 +188,20 @@ pub fn converge(
         unsaved = true;
         progress(image.directions(), goal.most.max(image.directions()));
         if let Some(entry) = entry.as_ref().filter(|_| saved.elapsed() > SAVE_EVERY) {
-            keep(entry, &image);
+            cache::keep(entry, &image.to_bytes());
             (saved, unsaved) = (Instant::now(), false);
         }
     }
     if let Some(entry) = entry.as_ref().filter(|_| unsaved) {
-        keep(entry, &image);
+        cache::keep(entry, &image.to_bytes());
     }
     Ok(image)
 }
 
 /// Drops what is known of `world`.
-pub fn forget(world: &World, extent: [u32; 2], cache: &Path) {
+pub fn forget(world: &World, extent: [u32; 2], folder: &Path) {
     let name = format!("{}.reference", key(world, &Converged::new(extent)));
-    if let Err(e) = std::fs::remove_file(cache.join(name)) {
+    if let Err(e) = std::fs::remove_file(folder.join(name)) {
         log::warn!("a reference is not dropped: {e}");
     }
 }
@@ -219,18 +211,6 @@ fn open(world: &World, device: &Options, image: &Converged) -> Result<Session> {
     let config = settings.config();
     config.validate()?;
     Session::new(Headless::new(device, &Requirements::of(&config))?, world, &config)
-}
-
-/// Writes a cache entry if that is possible.
-fn keep(entry: &Path, image: &Converged) {
-    let Some(folder) = entry.parent() else { return };
-    let written = std::fs::create_dir_all(folder).map_err(|e| e.to_string());
-    let written = written.and_then(|()| {
-        write_atomically(entry, |file| file.write_all(&image.to_bytes())).map_err(|e: offline::error::Error| e.to_string())
-    });
-    if let Err(e) = written {
-        log::warn!("the reference is not kept: {e}");
-    }
 }
 
 /// Hashes text as it is written.
@@ -281,16 +261,15 @@ mod tests {
     }
 
     #[test]
-    fn entries_are_continued_and_damaged_ones_ignored() {
+    fn entries_are_continued_and_those_of_other_frames_ignored() {
         let kept = image(4);
         let bytes = kept.to_bytes();
         let new = Converged::new([2, 1]);
         let found = Converged::from_bytes(&bytes, &new).unwrap();
         assert_eq!((&found.halves, found.cached), (&kept.halves, kept.directions()));
-        let mut flipped = bytes.clone();
-        flipped[50] ^= 1;
-        for damaged in [&flipped, &bytes[..bytes.len() - 4], &bytes[..20], &[]] {
-            assert_eq!(Converged::from_bytes(damaged, &new), None);
+        // Damage is found by the cache's own checksum.
+        for other in [&bytes[..bytes.len() - 4], &bytes[..20], &[]] {
+            assert_eq!(Converged::from_bytes(other, &new), None);
         }
         assert_eq!(Converged::from_bytes(&bytes, &Converged::new([1, 2])), None);
         let mut infinite = kept.clone();

@@ -1,0 +1,103 @@
+//! What a session's last frame left on the device.
+
+use crate::gpu::access::Access;
+use crate::gpu::buffer::Buffer;
+use crate::gpu::image::Image;
+use crate::gpu::memory::Location;
+use crate::gpu::recorder::Recorder;
+use crate::gpu::retire::{Build, Retired};
+use crate::offline::error::{Error, Result};
+use crate::offline::session::{Session, closed};
+use crate::renderer::Renderer;
+use ash::vk;
+
+impl Session {
+    /// The number of samples that the last frame shaded.
+    ///
+    /// # Errors
+    /// The device's.
+    pub fn shaded(&mut self) -> Result<u32> {
+        Ok(self.words("arguments")?.get(3).copied().unwrap_or(0))
+    }
+
+    /// The words of one of the renderer's own buffers after the last frame.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] for a name that the configuration has no buffer of.
+    pub fn words(&mut self, name: &'static str) -> Result<Vec<u32>> {
+        let renderer = self.renderer.as_ref().ok_or_else(closed)?;
+        let buffer = renderer.buffer(name).ok_or_else(|| Error::argument("buffer", "one that the frame writes", name))?;
+        let bytes = self.read(buffer.size, |renderer, rec, target| {
+            if let Some(buffer) = renderer.buffer(name) {
+                copy_buffer(rec, buffer, target);
+            }
+        })?;
+        Ok(bytemuck::pod_collect_to_vec(&bytes))
+    }
+
+    /// The texels of one of the renderer's own images after the last frame, in its own format and extent.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] for a name that the configuration has no image of.
+    pub fn image(&mut self, name: &str) -> Result<(Vec<u8>, vk::Format, [u32; 2])> {
+        let renderer = self.renderer.as_ref().ok_or_else(closed)?;
+        let image = renderer.image(name).ok_or_else(|| Error::argument("image", "one that the frame writes", name))?;
+        let (format, extent) = (image.desc.format, image.extent());
+        let (name, size) = (image.desc.name, image.desc.bytes());
+        let bytes = self.read(size, |renderer, rec, target| {
+            if let Some(image) = renderer.image(name) {
+                copy_image(rec, image, target);
+            }
+        })?;
+        Ok((bytes, format, extent))
+    }
+
+    /// What `record` copies into a host-visible buffer of `size` bytes.
+    pub(super) fn read(&mut self, size: u64, record: impl FnOnce(&Renderer, &mut Recorder<'_>, &Buffer)) -> Result<Vec<u8>> {
+        let renderer = self.renderer.as_mut().ok_or_else(closed)?;
+        let mut target = None;
+        self.headless.submit(|cmd, memory| {
+            let usage = vk::BufferUsageFlags::TRANSFER_DST;
+            let buffer =
+                Build::run(renderer.context(), memory, |b| Buffer::new(b, "read-back", size, usage, Location::Readback))?;
+            renderer.copy_out(cmd, |renderer, rec| {
+                record(renderer, rec, &buffer);
+                rec.buffer(&buffer, Access::HOST_READ);
+                rec.flush();
+                rec.forget(buffer.handle);
+            });
+            target = Some(buffer);
+            Ok(Retired::default())
+        })?;
+        let buffer = target.ok_or_else(closed)?;
+        let bytes = buffer.bytes().to_vec();
+        let (host, memory) = self.headless.parts()?;
+        let mut bag = Retired::default();
+        buffer.retire(&mut bag);
+        // SAFETY: the submission was waited for.
+        unsafe { bag.free(host.device, memory) };
+        Ok(bytes)
+    }
+}
+
+fn copy_image(rec: &mut Recorder<'_>, image: &Image, target: &Buffer) {
+    rec.image(image, Access::TRANSFER_READ);
+    rec.buffer(target, Access::TRANSFER_WRITE);
+    rec.flush();
+    let [width, height] = image.extent();
+    let layers = vk::ImageSubresourceLayers { aspect_mask: image.desc.aspect(), layer_count: 1, ..Default::default() };
+    let extent = vk::Extent3D { width, height, depth: 1 };
+    let region = vk::BufferImageCopy { image_subresource: layers, image_extent: extent, ..Default::default() };
+    let layout = Access::TRANSFER_READ.layout;
+    // SAFETY: the command buffer is recording; the buffer holds the whole image.
+    unsafe { rec.cx.device.cmd_copy_image_to_buffer(rec.cmd, image.handle, layout, target.handle, &[region]) };
+}
+
+pub(super) fn copy_buffer(rec: &mut Recorder<'_>, buffer: &Buffer, target: &Buffer) {
+    rec.buffer(buffer, Access::TRANSFER_READ);
+    rec.buffer(target, Access::TRANSFER_WRITE);
+    rec.flush();
+    let region = vk::BufferCopy { size: buffer.size, ..Default::default() };
+    // SAFETY: the command buffer is recording; both buffers have the source's size.
+    unsafe { rec.cx.device.cmd_copy_buffer(rec.cmd, buffer.handle, target.handle, &[region]) };
+}
