@@ -15,8 +15,10 @@ layout(constant_id = 2) const bool KERNEL = false;
 #include "curvature.glsl"
 #include "bandwidth.glsl"
 #include "lobe_bandwidth.glsl"
+#include "forecast.glsl"
+#include "list.glsl"
 
-layout(local_size_x = 8, local_size_y = 8) in;
+layout(local_size_x = LIST_GROUP) in;
 
 layout(constant_id = 0) const int OPERATOR = OPERATOR_CLIPPED;
 // How the probes' bandwidths are combined, in the order of src/frequency/operators.rs.
@@ -37,22 +39,20 @@ layout(set = 2, binding = 9, std430) readonly buffer Lights {
     LightRecord lights[]; // exact ones first
 };
 
-// Groups of the passes that follow, and what decides on them.
-layout(set = 2, binding = 10, std430) buffer Forecast {
-    uint blocks_x, blocks_y, blocks_z; // of this pass over all blocks
-    uint shaded;                       // predicted, in 1/64 of a block, among the blocks that were looked at
-    uint cells_x, cells_y, cells_z;    // of the pyramid
-    uint covered;                      // blocks that were looked at
-    uint samples_x, samples_y, samples_z; // of the list of all samples
-    uint groups;                       // done, of those that look
-} forecast;
+layout(set = 2, binding = 10, std430) buffer Found {
+    Forecast forecast;
+};
+layout(set = 2, binding = 11, std430) readonly buffer Blocks {
+    uint blocks[]; // as block_entry packs them
+};
 
 layout(push_constant) uniform Push {
     int side;                // of a block, in samples
     int probes;
     float samples_per_cycle;
     int coarsest;            // level
-    int stride;              // 1 for every block; more to forecast from one block of that many a side
+    uint early;              // 1 to forecast from the blocks that are looked at first, writing nothing else
+    uint all;                // where the list of all blocks begins
     uint full_x;             // groups of the list of all samples
 } push;
 
@@ -89,27 +89,11 @@ float luminance(vec3 c) {
     return dot(c, vec3(0.2126, 0.7152, 0.0722));
 }
 
-// Level of the samples of `block`, which it writes unless it forecasts; -1 if none is covered.
-int predict(ivec2 block) {
-    ivec2 first = block * push.side, extent = ivec2(frame.extent.xy);
-    if (any(greaterThanEqual(first, extent))) {
-        return -1;
-    }
-    // The covered sample nearest to the middle stands for the block.
-    ivec2 at = first;
-    int nearest = 1 << 20;
-    for (int k = 0; k < push.side * push.side; ++k) {
-        ivec2 o = ivec2(k % push.side, k / push.side);
-        ivec2 d = o * 2 - push.side + 1;
-        int distance = d.x * d.x + d.y * d.y;
-        ivec2 p = min(first + o, extent - 1);
-        bool nearer = gbuffer_covered(p) && distance < nearest;
-        nearest = nearer ? distance : nearest;
-        at = nearer ? p : at;
-    }
-    if (nearest == 1 << 20) {
-        return -1;
-    }
+// Level of the samples of a block, which it writes unless it forecasts.
+int predict(uint entry) {
+    ivec2 block = block_place(entry), first = block * push.side, extent = ivec2(frame.extent.xy);
+    int k = block_sample(entry);
+    ivec2 at = first + ivec2(k % push.side, k / push.side);
     Place c = place_at(at);
     vec4 normal = texelFetch(normals, at, 0);
     float ray_length = length(c.ray);
@@ -172,11 +156,11 @@ int predict(ivec2 block) {
     float texture_units = sqrt(max(dot(footprint.xy, footprint.xy), dot(footprint.zw, footprint.zw)));
     b += min(m.record.texture_bandwidth.x * texture_units, 0.5);
     int found = bandwidth_level(b, push.samples_per_cycle, 0, push.coarsest);
-    if (push.stride > 1) {
+    if (push.early == 1u) {
         return found;
     }
     imageStore(prediction, block, vec4(min(b, 6e4), min(mean > 0.0 ? sqrt(variance) / mean : 0.0, 6e4), 0.0, 0.0));
-    for (int k = 0; k < push.side * push.side; ++k) {
+    for (k = 0; k < push.side * push.side; ++k) {
         ivec2 p = first + ivec2(k % push.side, k / push.side);
         if (all(lessThan(p, extent))) {
             // Another object in the block is shaded as it is.
@@ -207,13 +191,15 @@ void main() {
         group_covered = 0u;
     }
     barrier();
-    int found = predict(ivec2(gl_GlobalInvocationID.xy) * push.stride + push.stride / 2);
-    if (push.stride > 1 && found >= 0) {
+    bool early = push.early == 1u;
+    uint index = list_index(), count = early ? forecast.first : forecast.blocks;
+    int found = index < count ? predict(blocks[index + (early ? 0u : push.all)]) : -1;
+    if (early && found >= 0) {
         atomicAdd(group_shaded, max(64u >> (2 * found), 1u));
         atomicAdd(group_covered, 1u);
     }
     barrier();
-    if (push.stride > 1 && gl_LocalInvocationIndex == 0u) {
+    if (early && gl_LocalInvocationIndex == 0u) {
         atomicAdd(forecast.shaded, group_shaded);
         atomicAdd(forecast.covered, group_covered);
         decide();

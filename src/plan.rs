@@ -3,6 +3,7 @@
 use crate::config::{Config, GBufferSource, MAX_LEVEL, Rate};
 use crate::gpu::image::ImageDesc;
 use crate::light::{LightRecord, MAX_LIGHTS};
+use crate::pass::bandwidth;
 use ash::vk;
 
 /// Sizes that follow from a [`Config`].
@@ -212,8 +213,10 @@ pub fn memory_footprint(config: &Config) -> Footprint {
     let mut rows: Vec<_> = plan.images().map(|d| FootprintRow { name: d.name, bytes: d.bytes() }).collect();
     rows.push(FootprintRow { name: "list", bytes: plan.list_bytes() });
     rows.extend(plan.cell_buffers().into_iter().filter(|b| b.1 > 0).map(|(name, bytes)| FootprintRow { name, bytes }));
-    if plan.prediction.is_some() {
-        rows.push(FootprintRow { name: "forecast", bytes: crate::pass::bandwidth::FORECAST_BYTES });
+    if let Some(blocks) = plan.prediction {
+        let [width, height, _] = blocks.extent;
+        rows.push(FootprintRow { name: "forecast", bytes: bandwidth::FORECAST_BYTES });
+        rows.push(FootprintRow { name: "predicted", bytes: bandwidth::list_bytes([width, height]) });
     }
     rows.push(FootprintRow { name: "arguments", bytes: ARGUMENT_BYTES });
     rows.push(FootprintRow {

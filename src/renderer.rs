@@ -218,10 +218,13 @@ impl Renderer {
         // 4  The level of every sample: predicted, the same, or the host's.
         let shading = targets.plan.shading;
         let analysed = environment.bandwidth.as_ref().zip(materials.lobe_bandwidth.as_ref());
-        let predict = passes.bandwidth.as_ref().zip(analysed).zip(targets.prediction.as_ref()).zip(targets.forecast.as_ref());
+        let lists = targets.forecast.as_ref().zip(targets.predicted.as_ref());
+        let predict = passes.bandwidth.as_ref().zip(analysed).zip(targets.prediction.as_ref()).zip(lists);
         let mut forecast = None;
         let level = match (&targets.level, &inputs.levels) {
-            (Some(level), _) if let Some((((pass, (environment_bandwidth, lobe_bandwidth)), prediction), groups)) = predict => {
+            (Some(level), _)
+                if let Some((((pass, (environment_bandwidth, lobe_bandwidth)), prediction), (groups, blocks))) = predict =>
+            {
                 pass.record(
                     rec,
                     &bandwidth::Io {
@@ -239,6 +242,7 @@ impl Renderer {
                         level,
                         prediction,
                         forecast: groups,
+                        blocks,
                     },
                 );
                 forecast = Some(groups);

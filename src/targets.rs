@@ -7,7 +7,7 @@ use crate::gpu::image::Image;
 use crate::gpu::memory::Location;
 use crate::gpu::recorder::States;
 use crate::gpu::retire::{Build, Retired};
-use crate::pass::bandwidth::FORECAST_BYTES;
+use crate::pass::bandwidth::{self, FORECAST_BYTES};
 use crate::pass::gbuffer::GBufferImages;
 use crate::pass::pyramid::Cells;
 use crate::plan::{ARGUMENT_BYTES, Plan};
@@ -25,6 +25,8 @@ pub(crate) struct Targets {
     pub prediction: Option<Image>,
     /// What the `bandwidth` pass decides on the next passes.
     pub forecast: Option<Buffer>,
+    /// The blocks of samples that it predicts.
+    pub predicted: Option<Buffer>,
     pub cells: Option<CellBuffers>,
     pub radiance: Image,
     /// Radiance of odd levels.
@@ -86,6 +88,11 @@ impl Targets {
                 .prediction
                 .map(|_| Buffer::new(build, "forecast", FORECAST_BYTES, arguments, Location::Device))
                 .transpose()?,
+            predicted: plan
+                .prediction
+                .map(|desc| bandwidth::list_bytes([desc.extent[0], desc.extent[1]]))
+                .map(|bytes| Buffer::new(build, "predicted", bytes, storage | source, Location::Device))
+                .transpose()?,
             cells: (plan.levels.top > 0).then(|| CellBuffers::new(build, &plan)).transpose()?,
             radiance: Image::new(build, plan.radiance)?,
             odd: plan.odd.map(|desc| Image::new(build, desc)).transpose()?,
@@ -130,7 +137,7 @@ impl Targets {
             image.retire(bag);
         }
         let cells = self.cells.map(|c| [c.cells, c.blocks, c.weights, c.arguments]);
-        for buffer in cells.into_iter().flatten().chain(self.forecast).chain([self.arguments, self.list]) {
+        for buffer in cells.into_iter().flatten().chain(self.forecast).chain(self.predicted).chain([self.arguments, self.list]) {
             states.forget(buffer.handle);
             buffer.retire(bag);
         }

@@ -50,7 +50,7 @@ layout(set = 1, binding = 0, std430) readonly buffer Materials {
     MaterialRecord materials[];
 };
 layout(set = 1, binding = 1) uniform sampler3D reflectance_tables;        // reflectance in 1/sr, tables side by side in y and z
-layout(set = 1, binding = 2) uniform sampler2D importance_cells;    // cells t0, t1, phi0, phi1 of equal probability
+layout(set = 1, binding = 2) uniform usampler2D importance_cells;       // cells of equal probability: borders in t and phi, in steps, 16 bits each
 layout(set = 1, binding = 3) uniform sampler2D importance_density;      // density of h in 1/sr for weights
 
 // A material as seen from one view direction.
@@ -215,14 +215,21 @@ vec3 material_evaluate(Material m, vec3 wi, vec3 wo, vec3 h) {
     return value;
 }
 
+// Borders t and phi from steps of 16 bits (src/reflectance/importance.rs, `borders`).
+vec2 importance_border(uvec2 steps) {
+    vec2 share = vec2(ivec2(steps)) * vec2(1.0 / 65535.0, PI / 65535.0);
+    share.x *= share.x;
+    return vec2(share.x * share.x, share.y);
+}
+
 // A half vector, and its density in 1/sr of h, from two 32-bit numbers (Bagher 2011, section 3.3).
 vec4 material_sample(Material m, uvec2 u) {
     uint row, row_fraction, column, column_fraction;
     umulExtended(u.x, IMPORTANCE_ROWS, row, row_fraction);
     umulExtended(u.y << 1, IMPORTANCE_COLUMNS, column, column_fraction);
-    vec4 cell = texelFetch(importance_cells, m.cell + ivec2(row * IMPORTANCE_COLUMNS + column, 0), 0);
-    vec2 size = cell.yw - cell.xz;
-    vec2 at = cell.xz + size * (vec2(ivec2(row_fraction >> 8, column_fraction >> 8)) * (1.0 / 16777216.0));
+    uvec2 cell = texelFetch(importance_cells, m.cell + ivec2(row * IMPORTANCE_COLUMNS + column, 0), 0).xy;
+    vec2 low = importance_border(cell & 0xffffu), size = importance_border(cell >> 16) - low;
+    vec2 at = low + size * (vec2(ivec2(row_fraction >> 8, column_fraction >> 8)) * (1.0 / 16777216.0));
     float s = sqrt(at.x * (2.0 - at.x));
     vec2 phi = cos_sin((u.y & 0x80000000u) == 0u ? at.y : -at.y);
     return vec4(s * phi, 1.0 - at.x, 1.0 / (float(2u * IMPORTANCE_ROWS * IMPORTANCE_COLUMNS) * size.x * size.y));

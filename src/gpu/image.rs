@@ -50,7 +50,7 @@ pub(crate) fn texel_bytes(format: vk::Format) -> u64 {
     match format {
         vk::Format::R8_UINT => 1,
         vk::Format::R16_SFLOAT => 2,
-        vk::Format::R32G32_SFLOAT | vk::Format::R16G16B16A16_SFLOAT => 8,
+        vk::Format::R32G32_SFLOAT | vk::Format::R32G32_UINT | vk::Format::R16G16B16A16_SFLOAT => 8,
         vk::Format::R32G32B32A32_SFLOAT | vk::Format::R32G32B32A32_UINT => 16,
         _ => 4,
     }

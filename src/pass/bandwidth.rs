@@ -21,10 +21,20 @@ use bytemuck::{Pod, Zeroable};
 /// Pass, shader, label, timer and AOV name.
 pub const NAME: &str = "bandwidth";
 
-/// Shader interface.
+/// Shader interface of the list of blocks.
+pub const BLOCKS: Interface = Interface {
+    name: "bandwidth.blocks",
+    local_size: [8, 8, 1],
+    push_bytes: size_of::<BlocksPush>() as u32,
+    gbuffer: true,
+    materials: false,
+    own: &[D::UNIFORM_BUFFER, D::STORAGE_BUFFER, D::STORAGE_BUFFER],
+};
+
+/// Shader interface of the prediction.
 pub const INTERFACE: Interface = Interface {
     name: NAME,
-    local_size: [8, 8, 1],
+    local_size: [64, 1, 1],
     push_bytes: size_of::<Push>() as u32,
     gbuffer: true,
     materials: true,
@@ -40,8 +50,17 @@ pub const INTERFACE: Interface = Interface {
         D::STORAGE_IMAGE,
         D::STORAGE_BUFFER,
         D::STORAGE_BUFFER,
+        D::STORAGE_BUFFER,
     ],
 };
+
+#[repr(C)]
+#[derive(Clone, Copy, Pod, Zeroable)]
+struct BlocksPush {
+    side: i32,
+    stride: i32,
+    all: u32,
+}
 
 #[repr(C)]
 #[derive(Clone, Copy, Pod, Zeroable)]
@@ -50,20 +69,37 @@ struct Push {
     probes: i32,
     samples_per_cycle: f32,
     coarsest: i32,
-    stride: i32,
+    /// Whether only the blocks to look at first are predicted.
+    early: u32,
+    /// Where the list of all blocks begins.
+    all: u32,
     /// Groups across of the list of all samples, which only the forecast writes: extents change without the pass.
     full: u32,
 }
 
-/// One block in so many a side is looked at first.
+/// One block in so many a side is looked at first, if it has a surface.
 const STRIDE: u32 = 4;
 
-/// Bytes of the forecast: groups in x, y, z of this pass, of the pyramid and of the list of all samples, each with a count.
-pub(crate) const FORECAST_BYTES: u64 = 48;
+/// Words of the forecast (`glsl/include/forecast.glsl`).
+const FORECAST_WORDS: usize = 17;
+/// Its bytes.
+pub(crate) const FORECAST_BYTES: u64 = FORECAST_WORDS as u64 * 4;
+/// Where the groups over the blocks to look at first begin.
+const OF_FIRST: u64 = 48;
 /// Where the groups of the pyramid begin.
 pub(crate) const OF_CELLS: u64 = 16;
 /// Where the groups of the list of all samples begin.
 pub(crate) const OF_SAMPLES: u64 = 32;
+
+/// Entries of the list of blocks before those of all blocks, of which there are `extent`: a block in [`STRIDE`] a side.
+fn first_blocks(extent: [u32; 2]) -> u32 {
+    extent[0].div_ceil(STRIDE) * extent[1].div_ceil(STRIDE)
+}
+
+/// Bytes of the list of blocks, of which there are `extent`.
+pub(crate) fn list_bytes(extent: [u32; 2]) -> u64 {
+    4 * (u64::from(first_blocks(extent)) + u64::from(extent[0]) * u64::from(extent[1]))
+}
 
 pub(crate) struct Io<'a> {
     pub frame: &'a Buffer,
@@ -88,10 +124,13 @@ pub(crate) struct Io<'a> {
     pub prediction: &'a Image,
     /// Out: which of the next passes run.
     pub forecast: &'a Buffer,
+    /// Out: the blocks that are predicted.
+    pub blocks: &'a Buffer,
 }
 
-/// One pipeline for frames without lights beside the environment, one for frames with.
+/// The list of blocks; the prediction for frames without lights beside the environment and for frames with.
 pub(crate) struct Bandwidth {
+    blocks: ComputePipeline,
     pipelines: [ComputePipeline; 2],
     push: Push,
 }
@@ -108,6 +147,7 @@ impl Bandwidth {
             Combine::Max => 1,
             Combine::Literal => 2,
         };
+        let blocks = ComputePipeline::new(p.build, p.modules, &BLOCKS, p.bridge, p.slots, &[])?;
         let mut make = |lights| {
             let constants = [operator, combine, u32::from(config.widened()), lights];
             ComputePipeline::new(p.build, p.modules, &INTERFACE, p.bridge, p.slots, &constants)
@@ -118,10 +158,11 @@ impl Bandwidth {
             probes: config.probes as i32,
             samples_per_cycle: rate,
             coarsest: config.coarsest() as i32,
-            stride: 1,
+            early: 0,
+            all: 0,
             full: 0,
         };
-        Ok(Self { pipelines: [make(0)?, make(1)?], push })
+        Ok(Self { blocks, pipelines: [make(0)?, make(1)?], push })
     }
 
     pub fn record(&self, rec: &mut Recorder<'_>, io: &Io<'_>) {
@@ -139,12 +180,26 @@ impl Bandwidth {
         rec.buffer(io.forecast, Access::TRANSFER_WRITE);
         rec.flush();
         let groups = |extent: [u32; 2], of: u32| extent.map(|e| e.div_ceil(of));
-        let [blocks, cells] = [groups(io.prediction.extent(), 8), groups(io.level.extent(), pyramid::TILE)];
-        let all = [blocks[0], blocks[1], 1, 0, cells[0], cells[1], 1, 0, 0, io.level.extent()[1].div_ceil(8), 1, 0];
-        let all: [u32; FORECAST_BYTES as usize / 4] = all;
+        let (cells, samples) = (groups(io.level.extent(), pyramid::TILE), groups(io.level.extent(), 8));
+        let none = [0, 1, 1];
+        let mut forecast = [0; FORECAST_WORDS];
+        forecast[..3].copy_from_slice(&none);
+        forecast[4..7].copy_from_slice(&[cells[0], cells[1], 1]);
+        forecast[8..11].copy_from_slice(&[0, samples[1], 1]);
+        forecast[12..15].copy_from_slice(&none);
         // SAFETY: the command buffer is recording outside a render pass; the buffer holds as much.
-        unsafe { rec.cx.device.cmd_update_buffer(rec.cmd, io.forecast.handle, 0, bytemuck::bytes_of(&all)) };
+        unsafe { rec.cx.device.cmd_update_buffer(rec.cmd, io.forecast.handle, 0, bytemuck::bytes_of(&forecast)) };
         rec.buffer(io.forecast, Access::COMPUTE_ATOMIC);
+        rec.buffer(io.blocks, Access::COMPUTE_WRITE);
+        rec.flush();
+        let all = first_blocks(io.prediction.extent());
+        let found = [Resource::Uniform(io.frame), Resource::Buffer(io.forecast), Resource::Buffer(io.blocks)];
+        self.blocks.bind(rec, io.bridge, &found, &BlocksPush { side: self.push.side, stride: STRIDE as i32, all });
+        self.blocks.dispatch(rec, io.prediction.extent());
+        rec.buffer(io.forecast, Access::INDIRECT);
+        rec.flush();
+        rec.buffer(io.forecast, Access::COMPUTE_ATOMIC);
+        rec.buffer(io.blocks, Access::COMPUTE_READ);
         rec.flush();
         let resources = [
             Resource::Uniform(io.frame),
@@ -158,15 +213,12 @@ impl Bandwidth {
             Resource::Storage(io.prediction.view),
             Resource::Buffer(io.lights),
             Resource::Buffer(io.forecast),
+            Resource::Buffer(io.blocks),
         ];
         let pipeline = &self.pipelines[usize::from(io.light_count > 0)];
-        pipeline.bind(
-            rec,
-            io.bridge,
-            &resources,
-            &Push { stride: STRIDE as i32, full: groups(io.level.extent(), 8)[0], ..self.push },
-        );
-        pipeline.dispatch(rec, groups(io.prediction.extent(), STRIDE));
+        let push = Push { all, full: samples[0], ..self.push };
+        pipeline.bind(rec, io.bridge, &resources, &Push { early: 1, ..push });
+        pipeline.dispatch_indirect(rec, io.forecast, OF_FIRST);
         // Where many samples are to be shaded, nothing follows: finding the others would take longer than they do.
         rec.buffer(io.forecast, Access::INDIRECT);
         rec.image(io.level, Access::COMPUTE_WRITE);
@@ -175,12 +227,13 @@ impl Bandwidth {
         // To the validation layer every dispatch of the module writes all that it binds.
         rec.buffer(io.forecast, Access::COMPUTE_ATOMIC);
         rec.flush();
-        pipeline.push(rec, &self.push);
+        pipeline.push(rec, &push);
         pipeline.dispatch_indirect(rec, io.forecast, 0);
         rec.end();
     }
 
     pub fn retire(self, bag: &mut Retired) {
+        self.blocks.retire(bag);
         self.pipelines.into_iter().for_each(|p| p.retire(bag));
     }
 }

@@ -192,7 +192,7 @@ impl MaterialsUpload {
             tables: ImageUpload::new(build, image("tables", vk::Format::E5B9G9R9_UFLOAT_PACK32, table_extent), cast(&texels))?,
             importance: ImageUpload::new(
                 build,
-                image("importance", vk::Format::R32G32B32A32_SFLOAT, cell_extent),
+                image("importance", vk::Format::R32G32_UINT, cell_extent),
                 bytemuck::cast_slice(&cells),
             )?,
             density: ImageUpload::new(

@@ -48,7 +48,7 @@ pub(crate) struct PassContext<'a, 'b> {
 
 /// The shader interfaces of all compute modules, for tests and host profilers.
 pub fn interfaces() -> Vec<Interface> {
-    let mut all = vec![filter::INTERFACE, curvature::INTERFACE, bandwidth::INTERFACE, pyramid::INTERFACE];
+    let mut all = vec![filter::INTERFACE, curvature::INTERFACE, bandwidth::BLOCKS, bandwidth::INTERFACE, pyramid::INTERFACE];
     all.extend(classify::INTERFACES);
     all.extend([shade::INTERFACE, upsample::INTERFACE, resolve::INTERFACE]);
     all.extend(tonemap::INTERFACES);

@@ -20,6 +20,7 @@ modules! {
     "gbuffer.frag",
     "filter.comp",
     "curvature.comp",
+    "bandwidth.blocks.comp",
     "bandwidth.comp",
     "pyramid.comp",
     "classify.comp",

@@ -1,7 +1,7 @@
 //! How the tables of all materials lie in the textures that shaders read.
 
 use crate::material::Material;
-use crate::reflectance::importance::{COLUMNS, DENSITY_COLUMNS, DENSITY_ROWS, ImportanceTable, ROWS, VIEW_ANGLES};
+use crate::reflectance::importance::{COLUMNS, Cell, DENSITY_COLUMNS, DENSITY_ROWS, ImportanceTable, ROWS, VIEW_ANGLES};
 use crate::reflectance::ladder::Ladder;
 use crate::reflectance::merl::{PHI_DIFF, THETA_DIFF, THETA_HALF};
 use crate::reflectance::{LobeBandwidth, Model, bandwidth};
@@ -65,10 +65,10 @@ fn grid(tables: usize) -> [usize; 2] {
 }
 
 /// Cells, and the extent of their image. A view angle's cells are one row of texels: what a pixel draws from lies together.
-pub fn cells(tables: &[ImportanceTable]) -> (Vec<[f32; 4]>, [u32; 3]) {
+pub fn cells(tables: &[ImportanceTable]) -> (Vec<Cell>, [u32; 3]) {
     let [across, down] = grid(tables.len());
     let width = ROWS * COLUMNS;
-    let mut out = vec![[0.0; 4]; across * width * VIEW_ANGLES * down];
+    let mut out = vec![Cell::default(); across * width * VIEW_ANGLES * down];
     for (i, table) in tables.iter().enumerate() {
         let (column, place) = (i / TABLES_A_COLUMN, i % TABLES_A_COLUMN);
         for (angle, cells) in table.cells().chunks_exact(width).enumerate() {

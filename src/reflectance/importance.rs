@@ -23,6 +23,11 @@ pub const DENSITY_ROWS: usize = 64;
 /// Columns of the smooth density, at bin centres of `(1 - cos(phi_h)) / 2`.
 pub const DENSITY_COLUMNS: usize = 16;
 
+/// Of borders.
+const STEPS: u16 = u16::MAX;
+const STEP: f32 = 1.0 / STEPS as f32;
+const AZIMUTH_STEP: f32 = (PI / STEPS as f64) as f32;
+
 /// The grid on which a target is tabulated: rows uniform in `sqrt(theta_h / (pi/2))`, so that a lobe of alpha 0.01 spans 40.
 const FINE_ROWS: usize = 512;
 const FINE_COLUMNS: usize = 64;
@@ -36,10 +41,14 @@ const GRAZING: f64 = 2e-3;
 /// The smooth density's range: normal numbers in 16-bit floating point.
 const DENSITY_RANGE: (f64, f64) = (1e-4, 6e4);
 
+/// Borders of a cell in steps: from and to in t, from and to in the azimuth; see [`borders`]. Eight bytes, since what a frame
+/// draws from all its materials' tables passes through the processor's caches: with floats, 64 materials took 1.3 times as long as one.
+pub type Cell = [u16; 4];
+
 /// The importance tables of one reflectance.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ImportanceTable {
-    cells: Vec<[f32; 4]>,
+    cells: Vec<Cell>,
     density: Vec<f32>,
 }
 
@@ -73,9 +82,8 @@ impl ImportanceTable {
         table
     }
 
-    /// The cells `(t0, t1, phi0, phi1)`, `[node][row][column]`: neighbours share borders bit for bit, rows fill [0, 1] and
-    /// columns fill [0, pi] (pi as `f32`), none is empty.
-    pub fn cells(&self) -> &[[f32; 4]] {
+    /// The cells, `[node][row][column]`: neighbours share borders, rows and columns fill the range of steps, none is empty.
+    pub fn cells(&self) -> &[Cell] {
         &self.cells
     }
 
@@ -90,7 +98,7 @@ impl ImportanceTable {
         let (sign, v) = if u[1] < 0.5 { (1.0, 2.0 * u[1]) } else { (-1.0, 2.0 * u[1] - 1.0) };
         let (column, along_phi) = split(v, COLUMNS);
         let cell = self.cell(node(cos_o), row, column);
-        let [t0, t1, phi0, phi1] = cell.map(f64::from);
+        let [t0, t1, phi0, phi1] = borders(cell).map(f64::from);
         let (t, phi) = (t0 + (t1 - t0) * along_t, sign * (phi0 + (phi1 - phi0) * along_phi));
         let sine = (t * (2.0 - t)).sqrt();
         (DVec3::new(sine * phi.cos(), sine * phi.sin(), 1.0 - t), cell_density(cell))
@@ -114,8 +122,8 @@ impl ImportanceTable {
         let sine = h.x * h.x + h.y * h.y;
         let (t, phi) = ((sine / (1.0 + h.z)) as f32, h.y.abs().atan2(h.x) as f32);
         let node = node(cos_o);
-        let row = (0..ROWS).find(|&r| t < self.cell(node, r, 0)[1]).unwrap_or(ROWS - 1);
-        let column = (0..COLUMNS).find(|&c| phi < self.cell(node, row, c)[3]).unwrap_or(COLUMNS - 1);
+        let row = (0..ROWS).find(|&r| t < borders(self.cell(node, r, 0))[1]).unwrap_or(ROWS - 1);
+        let column = (0..COLUMNS).find(|&c| phi < borders(self.cell(node, row, c))[3]).unwrap_or(COLUMNS - 1);
         cell_density(self.cell(node, row, column))
     }
 
@@ -141,7 +149,7 @@ impl ImportanceTable {
         row(r0) + (row(r1) - row(r0)) * r
     }
 
-    fn cell(&self, node: usize, row: usize, column: usize) -> [f32; 4] {
+    fn cell(&self, node: usize, row: usize, column: usize) -> Cell {
         self.cells[(node * ROWS + row) * COLUMNS + column]
     }
 }
@@ -156,9 +164,20 @@ fn viewer(cos_o: f64) -> DVec3 {
     DVec3::new((1.0 - cos_o * cos_o).max(0.0).sqrt(), 0.0, cos_o)
 }
 
+/// The borders `(t0, t1, phi0, phi1)` of a cell: `t` is the fourth power of its share of the steps, so that a lobe of alpha 0.001
+/// has thousands of them; the azimuth is uniform in them. As the shader computes them, bit for bit.
+pub fn borders(cell: Cell) -> [f32; 4] {
+    let [t0, t1, phi0, phi1] = cell.map(f32::from);
+    let t = |steps: f32| {
+        let square = (steps * STEP) * (steps * STEP);
+        square * square
+    };
+    [t(t0), t(t1), phi0 * AZIMUTH_STEP, phi1 * AZIMUTH_STEP]
+}
+
 /// Density per steradian in a cell: each has the same probability, half of it at either sign of the azimuth.
-fn cell_density(cell: [f32; 4]) -> f64 {
-    let [t0, t1, phi0, phi1] = cell.map(f64::from);
+fn cell_density(cell: Cell) -> f64 {
+    let [t0, t1, phi0, phi1] = borders(cell).map(f64::from);
     1.0 / ((2 * ROWS * COLUMNS) as f64 * (t1 - t0) * (phi1 - phi0))
 }
 
@@ -245,18 +264,20 @@ impl FineGrid {
     }
 
     /// Appends one node's cells: strips of equal mass in t, each cut into intervals of equal mass in the azimuth.
-    fn cut(&self, target: &[f64], cells: &mut Vec<[f32; 4]>) {
+    fn cut(&self, target: &[f64], cells: &mut Vec<Cell>) {
         let (fine_rows, _) = target.as_chunks::<FINE_COLUMNS>();
         let mass: Vec<f64> = fine_rows.iter().enumerate().map(|(r, f)| f.iter().sum::<f64>() * self.solid_angle(r)).collect();
-        for t in quantiles::<ROWS>(&self.t, &mass).windows(2) {
+        for t in in_steps(&quantiles::<ROWS>(&self.t, &mass), |t| t.sqrt().sqrt()).windows(2) {
+            let [t0, t1, ..] = borders([t[0], t[1], 0, 0]).map(f64::from);
             let mut strip = [0.0; FINE_COLUMNS];
             for (row, f) in fine_rows.iter().enumerate() {
-                let overlap = self.t[row + 1].min(t[1].into()) - self.t[row].max(t[0].into());
+                let overlap = self.t[row + 1].min(t1) - self.t[row].max(t0);
                 if overlap > 0.0 {
                     strip.iter_mut().zip(f).for_each(|(sum, f)| *sum += f * overlap);
                 }
             }
-            cells.extend(quantiles::<COLUMNS>(&self.phi, &strip).windows(2).map(|phi| [t[0], t[1], phi[0], phi[1]]));
+            let columns = in_steps(&quantiles::<COLUMNS>(&self.phi, &strip), |phi| phi / PI);
+            cells.extend(columns.windows(2).map(|phi| [t[0], t[1], phi[0], phi[1]]));
         }
     }
 
@@ -280,19 +301,32 @@ impl FineGrid {
 }
 
 /// The `N + 1` borders that cut positive masses, spread evenly between their `borders`, into `N` equal parts.
-/// They increase strictly: a part is never narrower than an `N`-th of a fine interval, which `f32` resolves on both grids.
-fn quantiles<const N: usize>(borders: &[f64], mass: &[f64]) -> Vec<f32> {
+fn quantiles<const N: usize>(borders: &[f64], mass: &[f64]) -> Vec<f64> {
     let total: f64 = mass.iter().sum();
     let mut cuts = Vec::with_capacity(N + 1);
-    cuts.extend(borders.first().map(|&first| first as f32));
+    cuts.extend(borders.first());
     let mut below = 0.0;
     for (interval, mass) in borders.windows(2).zip(mass) {
         while cuts.len() < N && below + mass >= total * cuts.len() as f64 / N as f64 {
             let within = ((total * cuts.len() as f64 / N as f64 - below) / mass).clamp(0.0, 1.0);
-            cuts.push((interval[0] + (interval[1] - interval[0]) * within) as f32);
+            cuts.push(interval[0] + (interval[1] - interval[0]) * within);
         }
         below += mass;
     }
-    cuts.extend(borders.last().map(|&last| last as f32));
+    cuts.extend(borders.last());
     cuts
+}
+
+/// The nearest steps to increasing `cuts`, of which `share` is the part of the range below them, that increase strictly and
+/// fill the range.
+fn in_steps(cuts: &[f64], share: impl Fn(f64) -> f64) -> Vec<u16> {
+    let last = cuts.len().saturating_sub(1);
+    let mut least = 0;
+    let step = |(i, &cut): (usize, &f64)| {
+        let nearest = (share(cut) * f64::from(STEPS)).round() as u16;
+        let step = if i == last { STEPS } else { nearest.clamp(least, STEPS - (last - i) as u16) };
+        least = step + u16::from(i < last);
+        step
+    };
+    cuts.iter().enumerate().map(step).collect()
 }
