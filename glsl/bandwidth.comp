@@ -53,7 +53,6 @@ layout(push_constant) uniform Push {
     int coarsest;            // level
     uint early;              // 1 to forecast from the blocks that are looked at first, writing nothing else
     uint all;                // where the list of all blocks begins
-    uint full_x;             // groups of the list of all samples
 } push;
 
 // Where more than this share of the samples is forecast, all of them are shaded: up-sampling shades a few per cent more than is
@@ -181,7 +180,7 @@ void decide() {
     if (shaded > FALLBACK * covered) {
         forecast.blocks_x = 0u;
         forecast.cells_x = 0u;
-        forecast.samples_x = push.full_x;
+        forecast.samples_x = STRIPE;
     }
 }
 

@@ -1,6 +1,7 @@
 #version 460
 // Lists the shading samples that carry a surface, tile by tile. The order of tiles depends on scheduling; nothing that
-// reads the list depends on its order.
+// reads the list depends on its order. But neighbours read the same parts of their material's tables, and a frame of many
+// materials reads more tables than caches hold: tiles are taken column by column from stripes of STRIPE of them.
 #include "frame.glsl"
 #include "gbuffer.glsl"
 #include "list.glsl"
@@ -22,7 +23,8 @@ shared uint tile_first;
 shared uint tile_count;
 
 void main() {
-    ivec2 p = ivec2(gl_GlobalInvocationID.xy);
+    ivec2 tile = ivec2(gl_WorkGroupID.y, gl_WorkGroupID.z * STRIPE + gl_WorkGroupID.x);
+    ivec2 p = tile * ivec2(gl_WorkGroupSize.xy) + ivec2(gl_LocalInvocationID.xy);
     bool covered = all(lessThan(uvec2(p), frame.extent.xy)) && gbuffer_covered(p);
     if (gl_LocalInvocationIndex == 0u) {
         tile_count = 0u;

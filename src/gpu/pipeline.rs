@@ -307,8 +307,13 @@ impl ComputePipeline {
     /// Dispatches over `extent` samples in two dimensions.
     pub fn dispatch(&self, rec: &Recorder<'_>, extent: [u32; 2]) {
         let [x, y, _] = self.interface.local_size;
+        self.dispatch_groups(rec, [extent[0].div_ceil(x), extent[1].div_ceil(y), 1]);
+    }
+
+    /// Dispatches so many groups in x, y and z.
+    pub fn dispatch_groups(&self, rec: &Recorder<'_>, [x, y, z]: [u32; 3]) {
         // SAFETY: `bind` came before; group counts follow from image extents, below every limit.
-        unsafe { rec.cx.device.cmd_dispatch(rec.cmd, extent[0].div_ceil(x), extent[1].div_ceil(y), 1) };
+        unsafe { rec.cx.device.cmd_dispatch(rec.cmd, x, y, z) };
     }
 
     /// Dispatches what the three words at byte `offset` of `arguments` say.

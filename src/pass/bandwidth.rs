@@ -14,7 +14,7 @@ use crate::gpu::retire::Retired;
 use crate::gpu::sampler::Samplers;
 use crate::pass::environment::EnvironmentImages;
 use crate::pass::materials::MaterialImages;
-use crate::pass::{PassContext, level, pyramid};
+use crate::pass::{PassContext, classify, level, pyramid};
 use ash::vk::DescriptorType as D;
 use bytemuck::{Pod, Zeroable};
 
@@ -73,8 +73,6 @@ struct Push {
     early: u32,
     /// Where the list of all blocks begins.
     all: u32,
-    /// Groups across of the list of all samples, which only the forecast writes: extents change without the pass.
-    full: u32,
 }
 
 /// One block in so many a side is looked at first, if it has a surface.
@@ -160,7 +158,6 @@ impl Bandwidth {
             coarsest: config.coarsest() as i32,
             early: 0,
             all: 0,
-            full: 0,
         };
         Ok(Self { blocks, pipelines: [make(0)?, make(1)?], push })
     }
@@ -179,13 +176,13 @@ impl Bandwidth {
         rec.image(io.prediction, Access::COMPUTE_WRITE);
         rec.buffer(io.forecast, Access::TRANSFER_WRITE);
         rec.flush();
-        let groups = |extent: [u32; 2], of: u32| extent.map(|e| e.div_ceil(of));
-        let (cells, samples) = (groups(io.level.extent(), pyramid::TILE), groups(io.level.extent(), 8));
+        let cells = io.level.extent().map(|e| e.div_ceil(pyramid::TILE));
+        let [_, across, stripes] = classify::groups_of_all(io.level.extent());
         let none = [0, 1, 1];
         let mut forecast = [0; FORECAST_WORDS];
         forecast[..3].copy_from_slice(&none);
         forecast[4..7].copy_from_slice(&[cells[0], cells[1], 1]);
-        forecast[8..11].copy_from_slice(&[0, samples[1], 1]);
+        forecast[8..11].copy_from_slice(&[0, across, stripes]);
         forecast[12..15].copy_from_slice(&none);
         // SAFETY: the command buffer is recording outside a render pass; the buffer holds as much.
         unsafe { rec.cx.device.cmd_update_buffer(rec.cmd, io.forecast.handle, 0, bytemuck::bytes_of(&forecast)) };
@@ -216,7 +213,7 @@ impl Bandwidth {
             Resource::Buffer(io.blocks),
         ];
         let pipeline = &self.pipelines[usize::from(io.light_count > 0)];
-        let push = Push { all, full: samples[0], ..self.push };
+        let push = Push { all, ..self.push };
         pipeline.bind(rec, io.bridge, &resources, &Push { early: 1, ..push });
         pipeline.dispatch_indirect(rec, io.forecast, OF_FIRST);
         // Where many samples are to be shaded, nothing follows: finding the others would take longer than they do.

@@ -51,6 +51,15 @@ pub(crate) enum From<'a> {
     Cells(Cells<'a>, &'a Buffer, Option<(&'a Buffer, u64)>),
 }
 
+/// Groups of the list of all samples: tiles down in a stripe (`STRIPE` of `glsl/include/list.glsl`), tiles across, stripes.
+pub(crate) fn groups_of_all(extent: [u32; 2]) -> [u32; 3] {
+    let [width, height, _] = INTERFACES[0].local_size;
+    [STRIPE, extent[0].div_ceil(width), extent[1].div_ceil(height * STRIPE)]
+}
+
+/// Tiles down in a stripe.
+const STRIPE: u32 = 4;
+
 pub(crate) struct Io<'a> {
     pub frame: &'a Buffer,
     pub bridge: BridgeSets,
@@ -88,7 +97,7 @@ impl Classify {
             From::Samples(extent) => {
                 rec.flush();
                 self.0.bind(rec, io.bridge, &[Resource::Uniform(io.frame), arguments, list], &());
-                self.0.dispatch(rec, extent);
+                self.0.dispatch_groups(rec, groups_of_all(extent));
             }
             From::Cells(Cells { cells, blocks, arguments: all }, weights, groups) => {
                 rec.buffer(cells, Access::COMPUTE_READ);
