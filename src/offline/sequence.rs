@@ -13,7 +13,7 @@ use std::time::Instant;
 
 /// Renders `frames` of `world` in order and hands each to `write`. A frame does not depend on those before it, except at
 /// [`Rate::Luminance`], which looks at the one before. In the statistics, times are those of all frames (at least five, the
-/// last one being repeated), counts the means over them; `setup_ms` holds all of the animation's work on the CPU and all uploads.
+/// last one being repeated) and counts the means over them; `setup_ms` holds the animation's work on the CPU and all uploads.
 /// `progress` is told how many of how many frames of the renderer are done.
 ///
 /// # Errors
