@@ -115,12 +115,20 @@ mod tests {
         d * (1.0 + WAVE.height(d, frame).0)
     }
 
+    /// Whether a triangle uses each vertex: at a pole one copy is left over.
+    fn used(mesh: &Mesh) -> Vec<bool> {
+        let mut used = vec![false; mesh.positions.len()];
+        mesh.indices.iter().for_each(|i| used[*i as usize] = true);
+        used
+    }
+
     #[test]
     fn normals_on_a_sphere_are_those_of_finite_differences() {
         let mesh = builtin::mesh("sphere", 256).unwrap();
         let moved = WAVE.displaced(&mesh, 3);
         let mut turned = 0.0_f64;
-        for (i, d) in mesh.positions.iter().enumerate() {
+        let used = used(&mesh);
+        for (i, d) in mesh.positions.iter().enumerate().filter(|(i, _)| used[*i]) {
             let d = Vec3::from(*d).as_dvec3().normalize();
             let (along, across) = d.any_orthonormal_pair();
             let difference = |t: DVec3| {
@@ -149,8 +157,9 @@ mod tests {
             assert!(mean < 2e-3, "{name}: {mean}");
             // Copies of the first and last column of each row.
             let columns = mesh.uvs.iter().position(|uv| uv[0] == 1.0).unwrap();
-            for (row, normals) in moved.positions.chunks(columns + 1).zip(moved.normals.chunks(columns + 1)) {
-                if name != "cloth" {
+            let (rows, used) = (moved.positions.chunks(columns + 1).zip(moved.normals.chunks(columns + 1)), used(&mesh));
+            for ((row, normals), used) in rows.zip(used.chunks(columns + 1)) {
+                if name != "cloth" && used[0] && used[columns] {
                     assert!(apart(&row[0], &row[columns]) < 1e-6, "{name}");
                     assert!(apart(&normals[0], &normals[columns]) < 5e-3, "{name}: {:?} {:?}", normals[0], normals[columns]);
                 }
