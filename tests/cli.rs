@@ -108,7 +108,8 @@ fn every_documented_flag_works_or_is_not_supported_yet() {
             if run.code == 0 {
                 run.quiet();
                 worked.push(format!("{flag} {value}"));
-                std::fs::remove_file(folder.0.join("out.exr")).unwrap();
+                let written = folder.files().into_iter().filter(|name| name.starts_with("out"));
+                written.for_each(|name| std::fs::remove_file(folder.0.join(name)).unwrap());
             } else {
                 run.refused(2, &["not supported yet", flag]);
                 later.push(format!("{flag} {value}"));
@@ -133,6 +134,7 @@ fn every_documented_flag_works_or_is_not_supported_yet() {
         "--aov curvature",
         "--aov bandwidth",
         "--aov spread",
+        "--frames 0..3",
     ] {
         assert!(worked.iter().any(|w| w == flag), "{flag}");
     }
@@ -312,7 +314,7 @@ fn layers_land_in_the_exr_under_their_names() {
 fn built_in_scenes_are_listed_and_render_without_a_validation_message() {
     let folder = Folder::new("scenes");
     let listing = folder.run(&["scenes"]).quiet();
-    let names = ["trio", "sphere", "bumpy-sphere", "torus-knot", "maps", "furnace"];
+    let names = ["trio", "sphere", "bumpy-sphere", "torus-knot", "maps", "waves", "furnace"];
     for name in names {
         let line = listing.lines().find(|line| line.split_whitespace().next() == Some(name));
         assert!(line.is_some_and(|line| line.split_whitespace().count() > 4), "{name} in {listing}");

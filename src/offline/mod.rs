@@ -1,6 +1,7 @@
 //! Headless rendering from files: scenes, meshes, images, the device, read-back, metrics and the f64 reference.
 //! The only part of the crate that creates instances, devices or queues, reads files or the environment, or prints.
 
+pub mod animation;
 pub mod aov;
 pub mod bench;
 pub mod builtin;
@@ -20,6 +21,7 @@ mod read_back;
 pub mod reference;
 pub mod render;
 pub mod scene;
+pub mod sequence;
 pub mod session;
 pub mod stats;
 pub mod texture;

@@ -19,7 +19,7 @@ use std::collections::BTreeMap;
 /// Frames before timing starts.
 pub(crate) const WARM_UP: u32 = 2;
 /// Frames that are timed.
-const TIMED: u32 = 5;
+pub(super) const TIMED: u32 = 5;
 /// Directions of one frame of a reference: independent frames are averaged, so that no single dispatch runs for minutes.
 const REFERENCE_CHUNK: u32 = 1024;
 
@@ -87,8 +87,13 @@ impl Settings {
         }
     }
 
-    fn rate(&self) -> Rate {
+    pub(super) fn rate(&self) -> Rate {
         if self.reference.is_some() { crate::Rate::Full.into() } else { self.rate }
+    }
+
+    /// Frames of the renderer that make one image.
+    pub(super) fn chunks(&self) -> u32 {
+        self.reference.map_or(1, |n| n.div_ceil(REFERENCE_CHUNK))
     }
 
     pub(crate) fn config(&self) -> Config {
@@ -125,31 +130,16 @@ pub struct Rendered {
 /// # Errors
 /// [`crate::offline::error::Error`] of the settings, the device or the driver.
 pub fn render(world: &World, settings: &Settings, progress: &mut dyn FnMut(u32, u32)) -> Result<Rendered> {
-    let config = settings.config();
-    config.validate()?;
-    let headless = Headless::new(&settings.device, &Requirements::of(&config))?;
-    let mut session = Session::new(headless, world, &config)?;
+    let (mut session, config) = open(world, settings)?;
     let rate = settings.rate();
     rate.prepare(&mut session, world, &config, &settings.device, settings.seed)?;
-    let chunks = settings.reference.map_or(1, |n| n.div_ceil(config.directions));
+    let chunks = settings.chunks();
     let total = chunks + if settings.timed { WARM_UP + TIMED } else { 0 };
-
-    let mut sum: Vec<f64> = Vec::new();
-    for chunk in 0..chunks {
-        rate.follow(&mut session, &config)?;
-        session.frame([settings.seed, chunk])?;
-        let (bytes, ..) = session.image("resolved")?;
-        let values: Vec<f32> = bytemuck::pod_collect_to_vec(&bytes);
-        sum.resize(values.len(), 0.0);
-        sum.iter_mut().zip(&values).for_each(|(s, v)| *s += f64::from(*v));
-        progress(chunk + 1, total);
-    }
-    let channel = |c: usize| sum.iter().skip(c).step_by(4).map(|s| (s / f64::from(chunks)) as f32).collect();
-    let [width, height] = settings.extent;
-    let mut channels: Vec<_> = ["R", "G", "B", "A"].iter().enumerate().map(|(c, n)| (n.to_string(), channel(c))).collect();
-    for aov in &settings.aovs {
-        channels.extend(aov.read(&mut session, settings.samples_per_side, config.directions)?);
-    }
+    let mut done = 0;
+    let image = image(&mut session, settings, &config, 0, &mut |_| {
+        done += 1;
+        progress(done, total);
+    })?;
 
     // A frame's times arrive when its slot is recorded again.
     let mut timings: Vec<FrameTimings> = Vec::new();
@@ -162,7 +152,57 @@ pub fn render(world: &World, settings: &Settings, progress: &mut dyn FnMut(u32, 
         progress(chunks + frame + 1, total);
     }
     let stats = statistics(world, settings, &config, &mut session, &timings)?;
-    Ok(Rendered { image: LinearImage { width, height, channels }, stats })
+    Ok(Rendered { image, stats })
+}
+
+/// A session of `world` with these settings.
+pub(super) fn open(world: &World, settings: &Settings) -> Result<(Session, Config)> {
+    let config = settings.config();
+    config.validate()?;
+    let headless = Headless::new(&settings.device, &Requirements::of(&config))?;
+    Ok((Session::new(headless, world, &config)?, config))
+}
+
+/// What the session shows, as frame `number`, with its layers. `each` is called after every frame of the renderer, of which a
+/// reference has several.
+pub(super) fn image(
+    session: &mut Session,
+    settings: &Settings,
+    config: &Config,
+    number: u32,
+    each: &mut dyn FnMut(&Session),
+) -> Result<LinearImage> {
+    let chunks = settings.chunks();
+    let mut sum: Vec<f64> = Vec::new();
+    for chunk in 0..chunks {
+        settings.rate().follow(session, config)?;
+        session.frame([settings.seed, number.wrapping_mul(chunks).wrapping_add(chunk)])?;
+        each(session);
+        let (bytes, ..) = session.image("resolved")?;
+        let values: Vec<f32> = bytemuck::pod_collect_to_vec(&bytes);
+        sum.resize(values.len(), 0.0);
+        sum.iter_mut().zip(&values).for_each(|(s, v)| *s += f64::from(*v));
+    }
+    let channel = |c: usize| sum.iter().skip(c).step_by(4).map(|s| (s / f64::from(chunks)) as f32).collect();
+    let [width, height] = settings.extent;
+    let mut channels: Vec<_> = ["R", "G", "B", "A"].iter().enumerate().map(|(c, n)| (n.to_string(), channel(c))).collect();
+    for aov in &settings.aovs {
+        channels.extend(aov.read(session, settings.samples_per_side, config.directions)?);
+    }
+    Ok(LinearImage { width, height, channels })
+}
+
+/// Counts of the session's last frame.
+pub(super) fn pixels(session: &mut Session, config: &Config) -> Result<Pixels> {
+    let pixel = config.samples_per_side.ilog2() as i32;
+    let mut by_level = BTreeMap::new();
+    for (_, level) in levels::shaded(session)? {
+        *by_level.entry(level as i32 - pixel).or_insert(0) += 1;
+    }
+    let shaded = by_level.values().sum();
+    let (ids, ..) = session.image("ids")?;
+    let covered = ids.chunks_exact(4).filter(|id| id.iter().any(|byte| *byte != 0)).count() as u64;
+    Ok(Pixels { covered, shaded, by_level })
 }
 
 /// Statistics of the session's last frame and of the times of some.
@@ -173,17 +213,22 @@ pub(crate) fn statistics(
     session: &mut Session,
     timings: &[FrameTimings],
 ) -> Result<Stats> {
-    let pixel = config.samples_per_side.ilog2() as i32;
-    let mut by_level = BTreeMap::new();
-    for (_, level) in levels::shaded(session)? {
-        *by_level.entry(level as i32 - pixel).or_insert(0) += 1;
-    }
-    let shaded = by_level.values().sum();
-    let (ids, ..) = session.image("ids")?;
-    let covered = ids.chunks_exact(4).filter(|id| id.iter().any(|byte| *byte != 0)).count() as u64;
+    let pixels = pixels(session, config)?;
+    Ok(report(world, settings, config, session, timings, pixels))
+}
+
+/// Statistics of frames that took `timings` and, in the mean, shaded `pixels`.
+pub(super) fn report(
+    world: &World,
+    settings: &Settings,
+    config: &Config,
+    session: &Session,
+    timings: &[FrameTimings],
+    pixels: Pixels,
+) -> Stats {
     let area_lights = world.lights.iter().filter(|l| l.is_area()).count() as u32;
     let shines = world.environment.as_ref().is_some_and(|e| e.intensity > 0.0);
-    let taken = shaded * u64::from(Directions::of(config, shines, area_lights).total(area_lights));
+    let taken = pixels.shaded * u64::from(Directions::of(config, shines, area_lights).total(area_lights));
     let estimator = match config.estimator {
         Estimator::Mis => "mis",
         Estimator::Brdf => "brdf",
@@ -205,18 +250,18 @@ pub(crate) fn statistics(
         ("seed", json!(settings.seed)),
         ("reference", json!(settings.reference)),
     ]);
-    Ok(Stats {
+    Stats {
         schema: 1,
         device: session.headless().info().clone(),
         scene: world.name.clone(),
         extent: settings.extent,
         settings: values,
-        pixels: Pixels { covered, shaded, by_level },
+        pixels,
         samples: Samples { taken, budget: taken },
         passes: pass_times(timings, session.pass_bytes()),
         frame_ms: Quantiles::of(timings.iter().map(|t| t.span_ms).collect()),
         setup_ms: session.setup().iter().copied().collect(),
         memory_bytes: session.headless().peak_bytes(),
         validation_messages: session.messages(),
-    })
+    }
 }

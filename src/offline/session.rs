@@ -27,16 +27,27 @@ use std::collections::HashMap;
 use std::sync::Arc;
 use std::time::Instant;
 
+/// The set-up time of uploading meshes.
+const MESHES: &str = "meshes";
 /// Near plane of the rasteriser as a fraction of the scene's reach; there is no far plane.
 const NEAR: f64 = 1e-3;
 
 struct MeshBuffers {
+    /// Kept, so that no other mesh is at its address.
+    _mesh: Arc<Mesh>,
     positions: Buffer,
     normals: Buffer,
     coordinates: Buffer,
     tangents: Option<Buffer>,
     indices: Buffer,
     count: u32,
+}
+
+impl MeshBuffers {
+    fn retire(self, bag: &mut Retired) {
+        let all = [self.positions, self.normals, self.coordinates, self.indices];
+        all.into_iter().chain(self.tangents).for_each(|buffer| buffer.retire(bag));
+    }
 }
 
 /// What every frame of the session shows.
@@ -90,7 +101,8 @@ pub type SetupTimes = Vec<(&'static str, f64)>;
 pub struct Session {
     pub(super) headless: Headless,
     pub(super) renderer: Option<Renderer>,
-    meshes: Vec<MeshBuffers>,
+    /// By the address of the mesh.
+    meshes: HashMap<usize, MeshBuffers>,
     shown: Shown,
     setup: SetupTimes,
 }
@@ -132,25 +144,45 @@ impl Session {
 
         let clock = Instant::now();
         let mut session =
-            Self { headless, renderer: Some(renderer), meshes: Vec::new(), shown: Shown::of(world, config.extent), setup };
-        session.upload_objects(world)?;
-        session.setup.push(("meshes", milliseconds(clock)));
+            Self { headless, renderer: Some(renderer), meshes: HashMap::new(), shown: Shown::of(world, config.extent), setup };
+        session.upload_objects(world, &mut HashMap::new())?;
+        session.setup.push((MESHES, milliseconds(clock)));
         Ok(session)
     }
 
-    fn upload_objects(&mut self, world: &World) -> Result<()> {
-        let mut known: HashMap<*const Mesh, usize> = HashMap::new();
+    /// Shows `world` as it is now from the next frame on: its camera and its objects. Meshes that are not on the device are
+    /// uploaded, those that no object has any more are freed; materials, environment and lights stay those of the beginning.
+    /// Nothing is derived from geometry. The time counts as set-up.
+    ///
+    /// # Errors
+    /// The library's or the device's.
+    pub fn show(&mut self, world: &World) -> Result<()> {
+        let clock = Instant::now();
+        let extent = self.renderer.as_ref().ok_or_else(closed)?.config().extent;
+        self.shown.view = view(&world.camera, extent, near(world));
+        self.shown.draws.clear();
+        let mut former = std::mem::take(&mut self.meshes);
+        let uploaded = self.upload_objects(world, &mut former);
+        let mut bag = Retired::default();
+        former.into_values().for_each(|buffers| buffers.retire(&mut bag));
+        let (host, memory) = self.headless.parts()?;
+        // SAFETY: every submission was waited for.
+        unsafe { bag.free(host.device, memory) };
+        if let Some((_, time)) = self.setup.iter_mut().find(|(name, _)| *name == MESHES) {
+            *time += milliseconds(clock);
+        }
+        uploaded
+    }
+
+    /// Draws for all objects; what they need is taken out of `former` or uploaded.
+    fn upload_objects(&mut self, world: &World, former: &mut HashMap<usize, MeshBuffers>) -> Result<()> {
         for (number, object) in (0u32..).zip(&world.objects) {
-            let index = match known.get(&Arc::as_ptr(&object.mesh)) {
-                Some(&index) => index,
-                None => {
-                    let buffers = self.upload_mesh(&object.mesh)?;
-                    self.meshes.push(buffers);
-                    known.insert(Arc::as_ptr(&object.mesh), self.meshes.len() - 1);
-                    self.meshes.len() - 1
-                }
-            };
-            let mesh = &self.meshes[index];
+            let key = Arc::as_ptr(&object.mesh) as usize;
+            if !self.meshes.contains_key(&key) {
+                let buffers = former.remove(&key).map_or_else(|| self.upload_mesh(&object.mesh), Ok)?;
+                self.meshes.insert(key, buffers);
+            }
+            let Some(mesh) = self.meshes.get(&key) else { continue };
             self.shown.draws.push(Draw {
                 positions: (mesh.positions.handle, 0),
                 normals: (mesh.normals.handle, 0),
@@ -166,7 +198,7 @@ impl Session {
         Ok(())
     }
 
-    fn upload_mesh(&mut self, mesh: &Mesh) -> Result<MeshBuffers> {
+    fn upload_mesh(&mut self, mesh: &Arc<Mesh>) -> Result<MeshBuffers> {
         let renderer = self.renderer.as_mut().ok_or_else(closed)?;
         let mut uploaded = None;
         self.headless.submit(|cmd, memory| {
@@ -191,7 +223,8 @@ impl Session {
             let [positions, normals, coordinates, indices] = uploads.map(|u| u.record(&mut rec, &mut bag));
             let tangents = tangents.map(|u| u.record(&mut rec, &mut bag));
             let count = mesh.indices.len() as u32;
-            uploaded = Some(MeshBuffers { positions, normals, coordinates, tangents, indices, count });
+            let _mesh = Arc::clone(mesh);
+            uploaded = Some(MeshBuffers { _mesh, positions, normals, coordinates, tangents, indices, count });
             Ok(bag)
         })?;
         uploaded.ok_or_else(closed)
@@ -326,10 +359,7 @@ impl Drop for Session {
         if let Some(image) = self.shown.levels.take() {
             image.retire(&mut bag);
         }
-        for mesh in self.meshes.drain(..) {
-            let all = [mesh.positions, mesh.normals, mesh.coordinates, mesh.indices];
-            all.into_iter().chain(mesh.tangents).for_each(|buffer| buffer.retire(&mut bag));
-        }
+        self.meshes.drain().for_each(|(_, buffers)| buffers.retire(&mut bag));
         if let Ok((host, memory)) = self.headless.parts() {
             // SAFETY: every submission was waited for.
             unsafe { bag.free(host.device, memory) };

@@ -1,4 +1,4 @@
-//! `passband render`: a scene to an image file.
+//! `passband render`: a scene to an image file, or frames of an animation to numbered ones.
 
 use clap::ValueEnum;
 use indicatif::{ProgressBar, ProgressStyle};
@@ -8,17 +8,19 @@ use passband::offline::image_io::{LinearImage, check_writable, write_atomically,
 use passband::offline::metrics::{Exposure, encode};
 use passband::offline::rates;
 use passband::offline::render::{Settings, render};
-use passband::offline::scene::Scene;
+use passband::offline::scene::{MAX_FRAMES, Scene};
+use passband::offline::sequence::render_frames;
 use passband::sampling::luminance;
 use passband::{Estimator, Filter};
-use std::path::PathBuf;
+use std::ops::Range;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant;
 
 /// Renders a scene file or a built-in scene
 ///
 /// EXR files hold linear radiance in R G B, coverage in A and every --aov as a layer; HDR files radiance alone; PNG files
-/// the image exposed to a mean of 0.3 over the covered pixels, clamped and encoded as sRGB.
+/// the image exposed to a mean of 0.3 over the covered pixels (of the first of --frames), clamped and encoded as sRGB.
 #[derive(clap::Args)]
 pub struct Args {
     /// A scene file (.toml) or a built-in name (see `passband scenes`)
@@ -53,9 +55,9 @@ pub struct Args {
     /// Seed of the sample points
     #[arg(long, value_name = "N", default_value_t = 0)]
     seed: u32,
-    /// Frames of an animation
-    #[arg(long, value_name = "A..B")]
-    frames: Option<String>,
+    /// Frames A to B - 1 of an animation, to OUT.0000.exr and so on (a plain render is frame 0)
+    #[arg(long, value_name = "A..B", value_parser = frames)]
+    frames: Option<Range<u32>>,
     /// A paper's own form of a step
     #[arg(long, value_name = "NAME")]
     literal: Vec<String>,
@@ -134,6 +136,20 @@ fn samples_per_cycle(text: &str) -> std::result::Result<SamplesPerCycle, String>
     rate.map(|x| SamplesPerCycle(Some(x))).ok_or_else(|| format!("expected a number > 0 or auto, got {text}"))
 }
 
+fn frames(text: &str) -> std::result::Result<Range<u32>, String> {
+    let parse = |t: &str| t.parse::<u32>().ok().filter(|n| *n <= MAX_FRAMES);
+    let range = text.split_once("..").and_then(|(a, b)| Some(parse(a)?..parse(b)?)).filter(|range| !range.is_empty());
+    range.ok_or_else(|| format!("expected A..B with A below B and B at most {MAX_FRAMES}, got {text}"))
+}
+
+/// `path` with a frame's number before its extension.
+fn numbered(path: &Path, frame: u32) -> PathBuf {
+    let mut name = path.file_stem().unwrap_or_default().to_os_string();
+    name.push(format!(".{frame:04}."));
+    name.push(path.extension().unwrap_or_default());
+    path.with_file_name(name)
+}
+
 /// WIDTHxHEIGHT of an image.
 pub fn size(text: &str) -> std::result::Result<[u32; 2], String> {
     let parse = |t: &str| t.parse::<u32>().ok().filter(|e| (1..=16384).contains(e));
@@ -182,7 +198,6 @@ impl Args {
             "tk" => Filter::Tk,
             _ => return Err(Error::NotSupportedYet { what: "--filter other than point and tk".into() }),
         };
-        later(self.frames.is_some(), "--frames")?;
         later(!self.literal.is_empty(), "--literal")?;
         Ok(Settings {
             extent: self.size.or(scene_size).unwrap_or([512, 512]),
@@ -214,39 +229,63 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         return Err(Error::argument("--output", "a name that ends in .exr, .png or .hdr", args.output.display()));
     }
     // Before the work, not after it.
-    std::iter::once(&args.output).chain(&args.stats).try_for_each(|path| check_writable(path))?;
+    match &args.frames {
+        Some(frames) => frames.clone().try_for_each(|frame| check_writable(&numbered(&args.output, frame)))?,
+        None => check_writable(&args.output)?,
+    }
+    args.stats.iter().try_for_each(|path| check_writable(path))?;
     let clock = Instant::now();
     let scene = Scene::load(&args.scene, &args.set)?;
-    let world = scene.resolve()?;
+    let mut world = scene.animated()?;
     let loading = clock.elapsed().as_secs_f64() * 1e3;
-    let settings = args.settings(world.size, Some(&scene))?;
+    let settings = args.settings(world.world().size, Some(&scene))?;
 
     let style = ProgressStyle::with_template("{msg} {bar:30} {pos}/{len} {eta}").unwrap_or_else(|_| ProgressStyle::default_bar());
     let bar = ProgressBar::new(1).with_style(style).with_message("frames");
-    let mut rendered = render(&world, &settings, &mut |done, total| {
+    let mut progress = |done: u32, total: u32| {
         bar.set_length(total.into());
         bar.set_position(done.into());
-    })?;
+    };
+    let mut stats = match args.frames.clone() {
+        Some(frames) => {
+            // One exposure for all, or the sequence would flicker.
+            let mut exposure = None;
+            let mut write = |frame, image: LinearImage| {
+                let factor = *exposure.get_or_insert_with(|| auto_exposure(&image));
+                write_image(&numbered(&args.output, frame), &image, &display(&image, factor))
+            };
+            render_frames(&mut world, &settings, frames, &mut progress, &mut write)?
+        }
+        None => {
+            let rendered = render(world.world(), &settings, &mut progress)?;
+            write_image(&args.output, &rendered.image, &display(&rendered.image, auto_exposure(&rendered.image)))?;
+            rendered.stats
+        }
+    };
     bar.finish_and_clear();
-    rendered.stats.setup_ms.insert("loading", loading);
-    write_image(&args.output, &rendered.image, &display(&rendered.image))?;
+    stats.setup_ms.insert("loading", loading);
     if let Some(path) = &args.stats {
-        let text = serde_json::to_string_pretty(&rendered.stats).map_err(|e| Error::argument("--stats", "numbers", e))?;
+        let text = serde_json::to_string_pretty(&stats).map_err(|e| Error::argument("--stats", "numbers", e))?;
         write_atomically(path, |file| std::io::Write::write_all(file, text.as_bytes()))?;
     }
-    for message in &rendered.stats.validation_messages {
+    for message in &stats.validation_messages {
         crate::complain(format_args!("validation: {message}"));
     }
-    Ok(if rendered.stats.validation_messages.is_empty() { ExitCode::SUCCESS } else { ExitCode::from(3) })
+    Ok(if stats.validation_messages.is_empty() { ExitCode::SUCCESS } else { ExitCode::from(3) })
 }
 
-/// Display bytes: exposed to a mean luminance of 0.3 over covered pixels, clamped, sRGB.
-fn display(image: &LinearImage) -> Vec<u8> {
-    let (Some(rgb), Some(coverage)) = (image.rgb(), image.channel("A")) else { return Vec::new() };
+/// What makes the mean luminance over covered pixels 0.3.
+fn auto_exposure(image: &LinearImage) -> f64 {
+    let (Some(rgb), Some(coverage)) = (image.rgb(), image.channel("A")) else { return 1.0 };
     let covered = rgb.iter().zip(coverage).filter(|(_, a)| **a > 0.0);
     let (sum, count) =
         covered.fold((0.0, 0u64), |(sum, n), (&[r, g, b], _)| (sum + luminance(glam::Vec3::new(r, g, b).as_dvec3()), n + 1));
-    let exposure = Exposure::Auto.factor(sum / count.max(1) as f64);
+    Exposure::Auto.factor(sum / count.max(1) as f64)
+}
+
+/// Display bytes: exposed, clamped, sRGB.
+fn display(image: &LinearImage, exposure: f64) -> Vec<u8> {
+    let Some(rgb) = image.rgb() else { return Vec::new() };
     let byte = |linear: f64| (encode(linear.clamp(0.0, 1.0)) * 255.0).round() as u8;
     let opaque = |&[r, g, b]: &[f32; 3]| {
         [byte(f64::from(r) * exposure), byte(f64::from(g) * exposure), byte(f64::from(b) * exposure), 255]

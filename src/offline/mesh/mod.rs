@@ -15,10 +15,12 @@ pub(crate) mod shapes;
 mod split;
 mod tangents;
 mod uv;
+mod wave;
 
 pub use atlas::cache_folder;
 pub use obj::read_obj;
 pub use uv::Projection;
+pub use wave::Wave;
 
 /// A triangle mesh in object space (right-handed, metres). All attributes are per vertex.
 #[derive(Clone, Debug, Default)]

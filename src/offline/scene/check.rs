@@ -37,7 +37,7 @@ pub(super) fn scene(source: &Source, file: &SceneFile) -> Result<()> {
         check.material(material.get_ref())?;
     }
     if let Some(animation) = &file.animation {
-        check.animation(animation, file.objects.get_ref().len())?;
+        check.animation(animation.get_ref(), file)?;
     }
     check.settings(&file.settings)?;
     match check.later.iter().min_by_key(|span| span.start) {
@@ -218,6 +218,14 @@ impl Check<'_> {
         let v = value.get_ref();
         self.require(v.iter().all(|c| c.is_finite()), &value.span(), "three finite numbers", format!("{v:?}"))?;
         self.require(v.iter().all(|c| single(*c)), &value.span(), SINGLE, format!("{v:?}"))
+    }
+
+    /// A finite vector that has a direction.
+    pub(super) fn direction(&mut self, value: &Spanned<Vector>) -> Result<()> {
+        let v = DVec3::from(*value.get_ref());
+        let fits = v.is_finite() && v.length() > 0.0;
+        self.require(fits, &value.span(), "a finite vector that is not 0", v)?;
+        self.require(v.as_vec3().is_finite(), &value.span(), SINGLE, v)
     }
 
     pub(super) fn scale(&mut self, value: &Spanned<Triple>) -> Result<()> {

@@ -2,9 +2,13 @@
 //! be is checked in [`super::check`].
 //!
 //! Beside the format's own wording: `rotate` turns about X, then Y, then Z; translation comes last and scaling first.
-//! Colours and scales may be one number for all three. Keyframes carry their `frame`; animated objects are
-//! `[[animation.objects]]` with `object = INDEX` and `keyframes = [...]`. An object whose mesh is a glTF file may leave out
+//! Colours and scales may be one number for all three. An object whose mesh is a glTF file may leave out
 //! `material`: it then has the file's own; and `[camera]` may be left out if such a file has one.
+//!
+//! Keyframes carry their `frame`; animated objects are `[[animation.objects]]` with `object = INDEX` and `keyframes = [...]`.
+//! What a key gives takes the place of the camera's or object's own, linearly between keys, rotations by the shortest arc; what
+//! no key gives stays. `wave` is in metres of the mesh, before its object's transform, `speed` in metres a frame; it travels
+//! along `direction` ([1, 0, 0]) over `objects = [INDEX, ...]` (all).
 
 use serde::de::{Error as _, IgnoredAny, SeqAccess};
 use serde::{Deserialize, Deserializer};
@@ -248,6 +252,9 @@ pub(super) struct Wave {
     pub amplitude: Spanned<f64>,
     pub length: Spanned<f64>,
     pub speed: Spanned<f64>,
+    #[serde(default, deserialize_with = "some_exactly")]
+    pub direction: Key<Vector>,
+    pub objects: Option<Vec<Spanned<u32>>>,
 }
 
 #[derive(Debug, Default, Deserialize)]

@@ -1,45 +1,10 @@
-//! Rules for the keys that the format knows and this version cannot do yet: their values are checked like all others.
+//! Rules for `[settings]`, of which this version cannot do some yet: their values are checked like all others.
 
 use crate::offline::error::Result;
-use crate::offline::scene::check::{Check, SINGLE, span};
-use crate::offline::scene::format::{Animation, Settings, Vector};
-use glam::DVec3;
-use toml::Spanned;
+use crate::offline::scene::check::{Check, span};
+use crate::offline::scene::format::Settings;
 
 impl Check<'_> {
-    pub(super) fn animation(&mut self, animation: &Spanned<Animation>, objects: usize) -> Result<()> {
-        let a = animation.get_ref();
-        let frames = *a.frames.get_ref();
-        self.require(frames > 0, &a.frames.span(), "at least one frame", frames)?;
-        let mut last = None;
-        for key in &a.camera {
-            self.frame(&key.frame, frames, &mut last)?;
-            self.each(&key.position, Self::vector)?;
-            self.each(&key.target, Self::vector)?;
-            self.each(&key.up, Self::direction)?;
-            self.each(&key.fov_y, |c, v| c.number(v, "0 < degrees < 180", |v| v > 0.0 && v < 180.0))?;
-        }
-        for object in &a.objects {
-            let index = *object.object.get_ref();
-            let expected = format!("an index below {objects}");
-            self.require((index as usize) < objects, &object.object.span(), &expected, index)?;
-            let mut last = None;
-            for key in &object.keyframes {
-                self.frame(&key.frame, frames, &mut last)?;
-                self.each(&key.translate, Self::vector)?;
-                self.each(&key.rotate, Self::vector)?;
-                self.each(&key.scale, Self::scale)?;
-            }
-        }
-        if let Some(wave) = &a.wave {
-            self.number(&wave.amplitude, "a number >= 0", |v| v >= 0.0)?;
-            self.number(&wave.length, "a number above 0", |v| v > 0.0)?;
-            self.number(&wave.speed, "a finite number", |_| true)?;
-        }
-        self.later.push(animation.span());
-        Ok(())
-    }
-
     pub(super) fn settings(&mut self, s: &Settings) -> Result<()> {
         self.each(&s.operator, |c, v| c.name(v, &["box", "clipped", "covariance"]))?;
         self.each(&s.combine, |c, v| c.name(v, &["mean", "max"]))?;
@@ -63,23 +28,6 @@ impl Check<'_> {
             span(&s.lod_bias),
         ];
         self.later.extend(all.into_iter().flatten());
-        Ok(())
-    }
-
-    /// A finite vector that has a direction.
-    pub(super) fn direction(&mut self, value: &Spanned<Vector>) -> Result<()> {
-        let v = DVec3::from(*value.get_ref());
-        let fits = v.is_finite() && v.length() > 0.0;
-        self.require(fits, &value.span(), "a finite vector that is not 0", v)?;
-        self.require(v.as_vec3().is_finite(), &value.span(), SINGLE, v)
-    }
-
-    /// A keyframe's number: within the animation and after the one before.
-    fn frame(&self, value: &Spanned<u32>, frames: u32, last: &mut Option<u32>) -> Result<()> {
-        let frame = *value.get_ref();
-        let fits = frame < frames && last.is_none_or(|last| frame > last);
-        self.require(fits, &value.span(), &format!("rising frames below {frames}"), frame)?;
-        *last = Some(frame);
         Ok(())
     }
 }

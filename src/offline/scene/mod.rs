@@ -1,11 +1,13 @@
 //! Scene files: TOML in, a resolved [`World`] out.
 
 use crate::frequency::operators::{Combine, Operator};
+use crate::offline::animation::AnimatedWorld;
 use crate::offline::error::{At, Error, Result};
 use crate::offline::input;
 use crate::offline::world::World;
 use std::path::{Path, PathBuf};
 
+mod animation;
 mod bakes;
 mod check;
 mod format;
@@ -17,16 +19,18 @@ mod overrides;
 mod resolve;
 mod source;
 
+pub use animation::MAX_FRAMES;
 pub use materials::{read_merl, read_rgl, read_sgd};
 
 /// Name and text of the scenes that need no other file.
-const BUILTINS: [(&str, &str); 7] = [
+const BUILTINS: [(&str, &str); 8] = [
     ("trio", include_str!("../../../scenes/trio.toml")),
     ("sphere", include_str!("../../../scenes/sphere.toml")),
     ("bumpy-sphere", include_str!("../../../scenes/bumpy-sphere.toml")),
     ("torus-knot", include_str!("../../../scenes/torus-knot.toml")),
     ("crowd", include_str!("../../../scenes/crowd.toml")),
     ("maps", include_str!("../../../scenes/maps.toml")),
+    ("waves", include_str!("../../../scenes/waves.toml")),
     ("furnace", include_str!("../../../scenes/furnace.toml")),
 ];
 
@@ -80,12 +84,21 @@ impl Scene {
         &self.name
     }
 
-    /// Loads every file that the scene names, and makes what it takes from formulas.
+    /// Loads every file that the scene names, and makes what it takes from formulas: the world in its first frame.
     ///
     /// # Errors
     /// [`Error::File`] for the file that is missing, malformed or out of range.
     pub fn resolve(&self) -> Result<World> {
-        resolve::world(self)
+        self.animated().map(AnimatedWorld::into_world)
+    }
+
+    /// As [`Self::resolve`], with all that changes from frame to frame.
+    ///
+    /// # Errors
+    /// As [`Self::resolve`]; [`Error::File`] also for a camera that looks nowhere between two keyframes.
+    pub fn animated(&self) -> Result<AnimatedWorld> {
+        let (world, sources) = resolve::world(self)?;
+        animation::animated(self, world, &sources)
     }
 
     /// The coarsest level of shading that the scene asks for, if it does: 0 is an output pixel, +1 is 2x2 coarser.

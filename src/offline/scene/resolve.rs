@@ -1,9 +1,10 @@
 //! From a checked scene file to everything in memory.
 
+use crate::offline::animation::Placement;
 use crate::offline::error::{Error, Result};
 use crate::offline::gltf;
 use crate::offline::mesh::{self, Mesh, Projection};
-use crate::offline::scene::format::{Camera as CameraKeys, Object as ObjectKeys, Triple};
+use crate::offline::scene::format::{Camera as CameraKeys, Object as ObjectKeys, Triple, Vector};
 use crate::offline::scene::maps::{self, Displacement, Textures};
 use crate::offline::scene::source::Span;
 use crate::offline::scene::{Scene, lights, materials};
@@ -14,7 +15,8 @@ use std::collections::HashMap;
 use std::sync::Arc;
 use toml::Spanned;
 
-pub(super) fn world(scene: &Scene) -> Result<World> {
+/// The world as the file has it, and which of the file's objects each of its objects is of.
+pub(super) fn world(scene: &Scene) -> Result<(World, Vec<usize>)> {
     let file = &scene.file;
     let mut models = materials::Models::default();
     let mut textures = Textures::default();
@@ -28,9 +30,9 @@ pub(super) fn world(scene: &Scene) -> Result<World> {
         known.displacements.push(displacement);
     }
     drop(textures);
-    let mut objects = Vec::new();
+    let (mut objects, mut sources) = (Vec::new(), Vec::new());
     let mut file_camera = None;
-    for spanned in file.objects.get_ref() {
+    for (source, spanned) in file.objects.get_ref().iter().enumerate() {
         let object = spanned.get_ref();
         let transform = transform(object);
         if let Some(name) = &object.material {
@@ -51,11 +53,12 @@ pub(super) fn world(scene: &Scene) -> Result<World> {
                 objects.extend(model.primitives.iter().map(placed));
             }
         }
+        sources.resize(objects.len(), source);
     }
     let own = file.camera.as_ref().map(camera);
     let none = || scene.source.missing(&(0..0), "camera", "a table, as no glTF mesh has a perspective camera");
     let camera = own.or(file_camera).ok_or_else(none)?;
-    Ok(World {
+    let world = World {
         name: scene.name.clone(),
         camera,
         size: file.camera.as_ref().and_then(|camera| camera.size.as_ref()).map(|size| *size.get_ref()),
@@ -63,7 +66,8 @@ pub(super) fn world(scene: &Scene) -> Result<World> {
         lights: lights::lights(file),
         objects,
         materials: all,
-    })
+    };
+    Ok((world, sources))
 }
 
 fn camera(keys: &CameraKeys) -> Camera {
@@ -184,17 +188,26 @@ fn project(mesh: &mut Mesh, scene: &Scene, object: &ObjectKeys) -> Result<()> {
     })
 }
 
-/// World from object: scaled, turned about X, then Y, then Z, then moved; or as given.
+/// World from object: as placed, or as given.
 fn transform(object: &ObjectKeys) -> DMat4 {
-    if let Some(transform) = &object.transform {
-        return DMat4::from_cols_array(transform.get_ref());
+    object.transform.as_ref().map_or_else(|| placement(Some(object)).transform(), |t| DMat4::from_cols_array(t.get_ref()))
+}
+
+/// Where an object without a matrix is.
+pub(super) fn placement(object: Option<&ObjectKeys>) -> Placement {
+    let vector = |key: Option<&Spanned<Vector>>| key.map_or(DVec3::ZERO, |v| DVec3::from(*v.get_ref()));
+    let Triple(scale) = object.and_then(|o| o.scale.as_ref()).map_or(Triple([1.0; 3]), |v| *v.get_ref());
+    Placement {
+        translate: vector(object.and_then(|o| o.translate.as_ref())),
+        rotate: rotation(vector(object.and_then(|o| o.rotate.as_ref()))),
+        scale: DVec3::from(scale),
     }
-    let translate = object.translate.as_ref().map_or(DVec3::ZERO, |v| DVec3::from(*v.get_ref()));
-    let degrees = object.rotate.as_ref().map_or(DVec3::ZERO, |v| DVec3::from(*v.get_ref()));
-    let Triple(scale) = object.scale.as_ref().map_or(Triple([1.0; 3]), |v| *v.get_ref());
+}
+
+/// Of degrees about X, then Y, then Z.
+pub(super) fn rotation(degrees: DVec3) -> DQuat {
     let [x, y, z] = degrees.to_array().map(f64::to_radians);
-    let rotation = DQuat::from_euler(EulerRot::ZYX, z, y, x);
-    DMat4::from_scale_rotation_translation(DVec3::from(scale), rotation, translate)
+    DQuat::from_euler(EulerRot::ZYX, z, y, x)
 }
 
 fn number(key: &Option<Spanned<f64>>, default: f64) -> f64 {
