@@ -15,6 +15,7 @@ layout(constant_id = 2) const bool KERNEL = false;
 #include "curvature.glsl"
 #include "bandwidth.glsl"
 #include "lobe_bandwidth.glsl"
+#include "texture_bandwidth.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
 
@@ -46,6 +47,10 @@ layout(set = 2, binding = 10, std430) buffer Forecast {
     uint samples_x, samples_y, samples_z; // of the list of all samples
     uint groups;                       // done, of those that look
 } forecast;
+
+layout(set = 2, binding = 11, std430) readonly buffer TextureBandwidths {
+    float texture_bandwidths[]; // cycles per unit of the surface's coordinates
+};
 
 layout(push_constant) uniform Push {
     int side;                // of a block, in samples
@@ -170,7 +175,9 @@ int predict(ivec2 block) {
     // Textures vary over the surface: their mips leave at most half a cycle a sample.
     vec4 footprint = gbuffer_footprint(at);
     float texture_units = sqrt(max(dot(footprint.xy, footprint.xy), dot(footprint.zw, footprint.zw)));
-    b += min(m.record.texture_bandwidth.x * texture_units, 0.5);
+    vec3 textures = m.record.texture_bandwidth.xyz;
+    int cell = texture_cell(int(textures.x), gbuffer_uv(at) * textures.yz, texture_units * max(textures.y, textures.z));
+    b += min(texture_bandwidths[cell] * texture_units, 0.5);
     int found = bandwidth_level(b, push.samples_per_cycle, 0, push.coarsest);
     if (push.stride > 1) {
         return found;

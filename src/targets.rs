@@ -25,6 +25,8 @@ pub(crate) struct Targets {
     pub prediction: Option<Image>,
     /// What the `bandwidth` pass decides on the next passes.
     pub forecast: Option<Buffer>,
+    /// The frame before's tiles and mean luminance, where they decide.
+    pub luminance: Option<[Buffer; 2]>,
     pub cells: Option<CellBuffers>,
     pub radiance: Image,
     /// Radiance of odd levels.
@@ -86,6 +88,13 @@ impl Targets {
                 .prediction
                 .map(|_| Buffer::new(build, "forecast", FORECAST_BYTES, arguments, Location::Device))
                 .transpose()?,
+            luminance: plan
+                .luminance_buffers(config)
+                .map(|[tiles, mean]| {
+                    let mut buffer = |(name, bytes)| Buffer::new(build, name, bytes, storage | source, Location::Device);
+                    Ok::<_, crate::Error>([buffer(tiles)?, buffer(mean)?])
+                })
+                .transpose()?,
             cells: (plan.levels.top > 0).then(|| CellBuffers::new(build, &plan)).transpose()?,
             radiance: Image::new(build, plan.radiance)?,
             odd: plan.odd.map(|desc| Image::new(build, desc)).transpose()?,
@@ -129,8 +138,14 @@ impl Targets {
             states.forget(image.handle);
             image.retire(bag);
         }
-        let cells = self.cells.map(|c| [c.cells, c.blocks, c.weights, c.arguments]);
-        for buffer in cells.into_iter().flatten().chain(self.forecast).chain([self.arguments, self.list]) {
+        let cells = self.cells.map(|c| vec![c.cells, c.blocks, c.weights, c.arguments]);
+        for buffer in cells
+            .into_iter()
+            .chain(self.luminance.map(Vec::from))
+            .flatten()
+            .chain(self.forecast)
+            .chain([self.arguments, self.list])
+        {
             states.forget(buffer.handle);
             buffer.retire(bag);
         }
