@@ -17,6 +17,7 @@ layout(constant_id = 2) const bool KERNEL = false;
 #include "lobe_bandwidth.glsl"
 #include "forecast.glsl"
 #include "list.glsl"
+#include "texture_bandwidth.glsl"
 
 layout(local_size_x = LIST_GROUP) in;
 
@@ -44,6 +45,10 @@ layout(set = 2, binding = 10, std430) buffer Found {
 };
 layout(set = 2, binding = 11, std430) readonly buffer Blocks {
     uint blocks[]; // as block_entry packs them
+};
+
+layout(set = 2, binding = 12, std430) readonly buffer TextureBandwidths {
+    float texture_bandwidths[]; // cycles per unit of the surface's coordinates
 };
 
 layout(push_constant) uniform Push {
@@ -153,7 +158,9 @@ int predict(uint entry) {
     // Textures vary over the surface: their mips leave at most half a cycle a sample.
     vec4 footprint = gbuffer_footprint(at);
     float texture_units = sqrt(max(dot(footprint.xy, footprint.xy), dot(footprint.zw, footprint.zw)));
-    b += min(m.record.texture_bandwidth.x * texture_units, 0.5);
+    vec3 textures = m.record.texture_bandwidth.xyz;
+    int cell = texture_cell(int(textures.x), gbuffer_uv(at) * textures.yz, texture_units * max(textures.y, textures.z));
+    b += min(texture_bandwidths[cell] * texture_units, 0.5);
     int found = bandwidth_level(b, push.samples_per_cycle, 0, push.coarsest);
     if (push.early == 1u) {
         return found;

@@ -1,6 +1,8 @@
 //! What a renderer is built for. Everything here is fixed until [`crate::Renderer::resize`] or a new renderer.
 
 use crate::error::{Error, Result};
+use crate::frequency::environment::EPS;
+use crate::frequency::luminance::COARSEST;
 use crate::frequency::operators::{Combine, Operator};
 use crate::gpu::pipeline::Modules;
 use ash::vk;
@@ -34,6 +36,9 @@ pub enum Rate {
     Given,
     /// The level at which the predicted bandwidth of the image asks for samples (Bagher 2011).
     Bandwidth,
+    /// Level 0, 1 or 2 by the contrast of the frame before ([`crate::frequency::luminance`]); the first frame, and the first after
+    /// [`crate::Renderer::resize`], has level 0.
+    Luminance,
 }
 
 /// How a material is read at a pixel's scale.
@@ -76,9 +81,9 @@ pub struct Config {
     pub estimator: Estimator,
     /// Where samples are shaded.
     pub rate: Rate,
-    /// Coarsest level of [`Rate::Given`] and [`Rate::Bandwidth`], 0 to 5, in output pixels; no cell is wider than 32 samples.
+    /// Coarsest level of all rates but [`Rate::Full`] and [`Rate::Uniform`], 0 to 5, in output pixels; no cell is wider than 32 samples.
     pub lmax: u32,
-    /// Directions in which the prediction looks, 1 to 64 a block of 2x2 samples (of a pixel, if that has more).
+    /// Directions in which the prediction looks, 1 to 256 a block of 2x2 samples (of a pixel, if that has more).
     pub probes: u32,
     /// Samples that a predicted cycle gets; by [`crate::frequency::level::samples_per_cycle`] if `None`.
     pub samples_per_cycle: Option<f32>,
@@ -86,6 +91,9 @@ pub struct Config {
     pub operator: Operator,
     /// How it combines its probes.
     pub combine: Combine,
+    /// Details below this share of the largest do not count in the analyses of environment, lobes and textures
+    /// ([`crate::frequency::wavelet`]): 0.001 to 0.1.
+    pub eps: f64,
     /// How materials are read.
     pub filter: Filter,
     /// Whether the mesh's curvature widens lobes as [`Filter::Tk`] does, whatever the filter.
@@ -114,6 +122,7 @@ impl Config {
             samples_per_cycle: None,
             operator: Operator::default(),
             combine: Combine::default(),
+            eps: EPS,
             filter: Filter::default(),
             geometric: false,
             directions: 64,
@@ -140,6 +149,7 @@ impl Config {
             Rate::Full => return 0,
             Rate::Uniform(level) => level,
             Rate::Given | Rate::Bandwidth => self.lmax,
+            Rate::Luminance => self.lmax.min(COARSEST),
         };
         level.saturating_add(above).min(MAX_LEVEL)
     }
@@ -170,7 +180,8 @@ impl Config {
             "at most 16384 samples a side where samples are not all shaded",
             most.to_string(),
         )?;
-        check((1..=64).contains(&self.probes), "probes", "1 to 64", self.probes.to_string())?;
+        check((1..=256).contains(&self.probes), "probes", "1 to 256", self.probes.to_string())?;
+        check((1e-3..=0.1).contains(&self.eps), "eps", "0.001 to 0.1", self.eps.to_string())?;
         let rate = self.samples_per_cycle.unwrap_or(1.0);
         check(rate > 0.0 && rate.is_finite(), "samples_per_cycle", "a finite number > 0", rate.to_string())?;
         let least = if self.estimator == Estimator::Mis { 2 } else { 1 };

@@ -1,9 +1,8 @@
 //! A reflectance and the textures that vary it over a surface; the f64 twin of looking them up.
 
 use crate::error::{Error, Result};
-use crate::frequency::TextureBandwidth;
-use crate::frequency::environment::EPS;
 use crate::frequency::wavelet::Grid;
+use crate::frequency::{TextureBandwidth, TextureCells};
 use crate::reflectance::half_row::Rows;
 use crate::reflectance::{BlinnPhong, Ggx, LobeBandwidth, Model, Reflectance};
 use crate::texture::{Format, Texture};
@@ -141,13 +140,11 @@ impl Material {
         Ok(())
     }
 
-    /// The bandwidth of colours and roughness over the surface in cycles per texture unit: that which 95 % of the map with the
-    /// greatest stay below. Normals count as curvature. Maps of more than 1024 texels a side count as their mips.
-    pub fn texture_bandwidth(&self) -> f64 {
+    /// How fast colours and roughness vary over the surface, in cycles per unit of its coordinates, analysed at threshold `eps`;
+    /// `None` without such maps. Normals count as curvature. Maps of more than 1024 texels a side count as their mips.
+    pub fn texture_bandwidth(&self, eps: f64) -> Option<TextureCells> {
         let [albedo, specular, _, roughness] = self.maps.textures();
-        let maps = [albedo, specular, roughness].into_iter().flatten();
-        let tiling = self.maps.tiling.map(f64::from);
-        let greatest = maps.map(|map| {
+        let analyse = |map: &Arc<Texture>| {
             let size = map.size();
             let level = size[0].max(size[1]).div_ceil(1024).next_power_of_two().ilog2();
             let [width, height] = size.map(|side| (side >> level).max(1) as usize);
@@ -156,16 +153,10 @@ impl Material {
                 let texel = map.sample(uv, f64::from(level)).truncate();
                 if map.format() == Format::Half1 { texel.x } else { crate::sampling::luminance(texel) }
             };
-            let bandwidth = TextureBandwidth::of(&Grid::from_fn(width, height, luminance), EPS);
-            let quantile = |grid: &Grid| {
-                let mut sorted = grid.values.clone();
-                sorted.sort_by(f64::total_cmp);
-                sorted.get((sorted.len() as f64 * 0.95) as usize).copied().unwrap_or(0.0)
-            };
-            let [u, v] = bandwidth.axes.each_ref().map(quantile);
-            (u * tiling[0]).max(v * tiling[1])
-        });
-        greatest.fold(0.0, f64::max)
+            TextureBandwidth::of(&Grid::from_fn(width, height, luminance), eps)
+        };
+        let maps: Vec<_> = [albedo, specular, roughness].into_iter().flatten().map(analyse).collect();
+        (!maps.is_empty()).then(|| TextureCells::of(&maps, self.maps.tiling.map(f64::from)))
     }
 
     /// What the maps hold at `uv`, where a pixel has the extent `footprint`: the derivatives of `uv` by its x and y, before

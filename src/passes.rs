@@ -6,7 +6,7 @@ use crate::gpu::pipeline::BridgeLayouts;
 use crate::gpu::retire::{Build, Retired};
 use crate::pass::gbuffer::GBuffer;
 use crate::pass::{
-    PassContext, bandwidth, classify, curvature, environment_bandwidth, pyramid, resolve, shade, tonemap, upsample,
+    PassContext, bandwidth, classify, curvature, environment_bandwidth, luminance, pyramid, resolve, shade, tonemap, upsample,
 };
 use ash::vk;
 
@@ -16,6 +16,7 @@ pub(crate) struct Passes {
     pub gbuffer: Option<GBuffer>,
     pub curvature: Option<curvature::Curvature>,
     pub bandwidth: Option<bandwidth::Bandwidth>,
+    pub luminance: Option<luminance::Luminance>,
     pub pyramid: Option<pyramid::Pyramid>,
     pub classify: classify::Classify,
     pub shade: shade::Shade,
@@ -35,10 +36,13 @@ impl Passes {
         p.bridge.gbuffer = layout(&gbuffer, config);
         let (top, predicted) = (config.coarsest(), config.rate == Rate::Bandwidth);
         Ok(Self {
-            environment_bandwidth: predicted.then(|| environment_bandwidth::EnvironmentBandwidth::new(&mut p)).transpose()?,
+            environment_bandwidth: predicted
+                .then(|| environment_bandwidth::EnvironmentBandwidth::new(&mut p, config.eps))
+                .transpose()?,
             gbuffer,
             curvature: config.curvature.then(|| curvature::Curvature::new(&mut p)).transpose()?,
             bandwidth: predicted.then(|| bandwidth::Bandwidth::new(&mut p, config)).transpose()?,
+            luminance: (top > 0 && config.rate == Rate::Luminance).then(|| luminance::Luminance::new(&mut p)).transpose()?,
             pyramid: (top > 0).then(|| pyramid::Pyramid::new(&mut p, top)).transpose()?,
             classify: classify::Classify::new(&mut p, top, predicted)?,
             shade: shade::Shade::new(&mut p, config, top > 0)?,
@@ -59,6 +63,9 @@ impl Passes {
             pass.retire(bag);
         }
         if let Some(pass) = self.bandwidth {
+            pass.retire(bag);
+        }
+        if let Some(pass) = self.luminance {
             pass.retire(bag);
         }
         if let Some(pass) = self.pyramid {

@@ -3,7 +3,7 @@
 use crate::config::{Config, GBufferSource, MAX_LEVEL, Rate};
 use crate::gpu::image::ImageDesc;
 use crate::light::{LightRecord, MAX_LIGHTS};
-use crate::pass::bandwidth;
+use crate::pass::{bandwidth, luminance};
 use ash::vk;
 
 /// Sizes that follow from a [`Config`].
@@ -164,6 +164,13 @@ impl Plan {
         [("cells", cell), ("blocks", block), ("weights", weight), ("block arguments", arguments)]
     }
 
+    /// Name and bytes of the buffers of [`Rate::Luminance`].
+    pub fn luminance_buffers(&self, config: &Config) -> Option<[(&'static str, u64); 2]> {
+        let tiles: u64 = luminance::tiles(config.extent).into_iter().map(u64::from).product();
+        let used = config.rate == Rate::Luminance && self.levels.top > 0;
+        used.then_some([("tiles", luminance::TILE_BYTES * tiles), ("mean luminance", luminance::MEAN_BYTES)])
+    }
+
     /// The largest storage buffer.
     pub fn largest_buffer(&self) -> u64 {
         self.cell_buffers().into_iter().map(|(_, bytes)| bytes).fold(self.list_bytes(), u64::max)
@@ -213,6 +220,7 @@ pub fn memory_footprint(config: &Config) -> Footprint {
     let mut rows: Vec<_> = plan.images().map(|d| FootprintRow { name: d.name, bytes: d.bytes() }).collect();
     rows.push(FootprintRow { name: "list", bytes: plan.list_bytes() });
     rows.extend(plan.cell_buffers().into_iter().filter(|b| b.1 > 0).map(|(name, bytes)| FootprintRow { name, bytes }));
+    rows.extend(plan.luminance_buffers(config).into_iter().flatten().map(|(name, bytes)| FootprintRow { name, bytes }));
     if let Some(blocks) = plan.prediction {
         let [width, height, _] = blocks.extent;
         rows.push(FootprintRow { name: "forecast", bytes: bandwidth::FORECAST_BYTES });

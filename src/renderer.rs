@@ -18,7 +18,8 @@ use crate::pass::environment::{EnvironmentImages, EnvironmentUpload};
 use crate::pass::gbuffer;
 use crate::pass::materials::{MaterialBridge, MaterialImages, MaterialsUpload};
 use crate::pass::{
-    FrameUniform, PassContext, bandwidth, classify, curvature, filter, level, pyramid, resolve, shade, tonemap, upsample,
+    FrameUniform, PassContext, bandwidth, classify, curvature, filter, level, luminance, pyramid, resolve, shade, tonemap,
+    upsample,
 };
 use crate::passes::{Passes, layout};
 use crate::plan::{Directions, LIGHT_BYTES};
@@ -49,6 +50,8 @@ pub struct Renderer {
     lights: Vec<Buffer>,
     passes: Passes,
     pub(crate) targets: Targets,
+    /// Whether `targets` hold a frame.
+    shown: bool,
     pub(crate) environment: Option<EnvironmentImages>,
     /// With the pass that is compiled for their maps.
     pub(crate) materials: Option<(MaterialImages, filter::Filter)>,
@@ -97,6 +100,7 @@ impl Renderer {
             lights,
             passes,
             targets,
+            shown: false,
             environment: None,
             materials: None,
             undestroyed: Undestroyed,
@@ -144,9 +148,9 @@ impl Renderer {
     ) -> Result<Retired> {
         let bridge = BridgeLayouts { gbuffer: layout(&self.passes.gbuffer, &self.config), materials: self.bridge.layout };
         let (modules, slots, widened) = (&self.config.modules, self.config.frames_in_flight, self.config.widened());
-        let predicted = self.config.rate == Rate::Bandwidth;
+        let eps = (self.config.rate == Rate::Bandwidth).then_some(self.config.eps);
         let (upload, filter) = Build::run(&self.cx, memory, |build| {
-            let upload = MaterialsUpload::new(build, materials, widened, predicted)?;
+            let upload = MaterialsUpload::new(build, materials, widened, eps)?;
             let filter = filter::Filter::new(&mut PassContext { build, modules, bridge, slots }, upload.uses(), widened)?;
             Ok((upload, filter))
         })?;
@@ -215,15 +219,15 @@ impl Renderer {
             pass.record(rec, &curvature::Io { frame, bridge, samplers, normals, curvature });
         }
 
-        // 4  The level of every sample: predicted, the same, or the host's.
+        // 4  The level of every sample: predicted, by the frame before, the same, or the host's.
         let shading = targets.plan.shading;
-        let analysed = environment.bandwidth.as_ref().zip(materials.lobe_bandwidth.as_ref());
+        let analysed = environment.bandwidth.as_ref().zip(materials.bandwidths.as_ref());
         let lists = targets.forecast.as_ref().zip(targets.predicted.as_ref());
         let predict = passes.bandwidth.as_ref().zip(analysed).zip(targets.prediction.as_ref()).zip(lists);
         let mut forecast = None;
         let level = match (&targets.level, &inputs.levels) {
             (Some(level), _)
-                if let Some((((pass, (environment_bandwidth, lobe_bandwidth)), prediction), (groups, blocks))) = predict =>
+                if let Some((((pass, (environment_bandwidth, material_bandwidths)), prediction), (groups, blocks))) = predict =>
             {
                 pass.record(
                     rec,
@@ -234,7 +238,7 @@ impl Renderer {
                         environment,
                         environment_bandwidth,
                         materials,
-                        lobe_bandwidth,
+                        material_bandwidths,
                         normals,
                         factors,
                         lights,
@@ -250,7 +254,14 @@ impl Renderer {
                 Some(level.view)
             }
             (Some(level), _) => {
-                level::record(rec, &level::Io { level, value: targets.plan.levels.top });
+                match (&passes.luminance, &targets.luminance) {
+                    (Some(pass), Some([tiles, mean])) if self.shown => {
+                        let previous = &targets.resolved;
+                        pass.record(rec, &luminance::Io { frame, samplers, previous, tiles, mean, level });
+                    }
+                    (Some(_), _) => level::record(rec, &level::Io { level, value: 0 }),
+                    (None, _) => level::record(rec, &level::Io { level, value: targets.plan.levels.top }),
+                }
                 rec.image(level, Access::COMPUTE_SAMPLED);
                 Some(level.view)
             }
@@ -324,6 +335,7 @@ impl Renderer {
             rec.release(image);
         }
         self.pass_bytes = std::mem::take(&mut rec.pass_bytes);
+        self.shown = true;
         Ok(())
     }
 
@@ -336,6 +348,7 @@ impl Renderer {
         config.validate()?;
         let fresh = Build::run(&self.cx, memory, |build| Targets::new(build, &config))?;
         self.config = config;
+        self.shown = false;
         let mut bag = Retired::default();
         std::mem::replace(&mut self.targets, fresh).retire(&mut self.states, &mut bag);
         Ok(bag)

@@ -27,6 +27,8 @@ pub(crate) struct Targets {
     pub forecast: Option<Buffer>,
     /// The blocks of samples that it predicts.
     pub predicted: Option<Buffer>,
+    /// The frame before's tiles and mean luminance, where they decide.
+    pub luminance: Option<[Buffer; 2]>,
     pub cells: Option<CellBuffers>,
     pub radiance: Image,
     /// Radiance of odd levels.
@@ -93,6 +95,13 @@ impl Targets {
                 .map(|desc| bandwidth::list_bytes([desc.extent[0], desc.extent[1]]))
                 .map(|bytes| Buffer::new(build, "predicted", bytes, storage | source, Location::Device))
                 .transpose()?,
+            luminance: plan
+                .luminance_buffers(config)
+                .map(|[tiles, mean]| {
+                    let mut buffer = |(name, bytes)| Buffer::new(build, name, bytes, storage | source, Location::Device);
+                    Ok::<_, crate::Error>([buffer(tiles)?, buffer(mean)?])
+                })
+                .transpose()?,
             cells: (plan.levels.top > 0).then(|| CellBuffers::new(build, &plan)).transpose()?,
             radiance: Image::new(build, plan.radiance)?,
             odd: plan.odd.map(|desc| Image::new(build, desc)).transpose()?,
@@ -136,8 +145,9 @@ impl Targets {
             states.forget(image.handle);
             image.retire(bag);
         }
-        let cells = self.cells.map(|c| [c.cells, c.blocks, c.weights, c.arguments]);
-        for buffer in cells.into_iter().flatten().chain(self.forecast).chain(self.predicted).chain([self.arguments, self.list]) {
+        let cells = self.cells.map(|c| vec![c.cells, c.blocks, c.weights, c.arguments]);
+        let lists = [self.forecast, self.predicted].into_iter().flatten().chain([self.arguments, self.list]);
+        for buffer in cells.into_iter().chain(self.luminance.map(Vec::from)).flatten().chain(lists) {
             states.forget(buffer.handle);
             buffer.retire(bag);
         }

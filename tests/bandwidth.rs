@@ -40,6 +40,13 @@ fn checks(side: usize) -> Maps {
     Maps { albedo: Some(Arc::new(albedo)), ..Maps::default() }
 }
 
+/// Flat in the left half, checks in the right one.
+fn half_checks() -> Maps {
+    let texel = |i: usize| [if i % 64 >= 32 && (i % 64 / 4 + i / 64 / 4).is_multiple_of(2) { 0.9 } else { 0.1 }; 3];
+    let albedo = Texture::colour([64; 2], &(0..64 * 64).map(texel).collect::<Vec<_>>()).unwrap();
+    Maps { albedo: Some(Arc::new(albedo)), ..Maps::default() }
+}
+
 fn plane(model: passband::reflectance::Model, map: LatLong) -> World {
     let mut plane = world("plane", 16, model, map);
     plane.camera.position = DVec3::new(0.0, 2.4, 2.4);
@@ -56,7 +63,7 @@ const BORDERS: f64 = 0.005;
 
 /// Every block of a frame against the twin.
 fn against_the_twin(world: &World, base: &Config, variants: &[(Operator, Combine)]) {
-    let twin = Twin::new(world);
+    let twin = Twin::new(world, base.eps);
     for &(operator, combine) in variants {
         let config = Config { operator, combine, curvature: true, ..base.clone() };
         let side = config.samples_per_side.max(2) as usize;
@@ -121,7 +128,8 @@ fn the_pass_is_as_its_twin() {
         Light::Directional { direction: [0.3, -1.0, -0.4], irradiance: [1.0, 2.0, 3.0] },
         Light::Sphere { position: [-1.5, 0.5, 1.0], radius: 0.2, radiance: [20.0; 3] },
     ];
-    let finer = Config { samples_per_side: 4, probes: 4, ..predicted([33, 29], 64) };
+    lit.materials[0].maps = Maps { tiling: [3.0, 0.7], ..half_checks() };
+    let finer = Config { eps: 0.03, samples_per_side: 4, probes: 4, ..predicted([33, 29], 64) };
     against_the_twin(&lit, &finer, &[clipped(Combine::Mean), clipped(Combine::Literal)]);
     let pixels = Config { samples_per_side: 2, ..predicted([41, 35], 64) };
     against_the_twin(&lit, &pixels, &[(Operator::Covariance, Combine::Max)]);
@@ -247,18 +255,59 @@ fn mean_level(world: &World, config: &Config) -> f64 {
     covered.iter().sum::<f64>() / covered.len() as f64
 }
 
+/// Half and twice the threshold of the analyses, calibrated as they are: the share of samples that get another level.
+#[test]
+fn the_threshold_matters_little() {
+    for material in ["mirror-metal", "metallic-paint", "rough"] {
+        let knot = world("torus-knot", 256, table(material), builtin::environment("sun-sky", 1024).unwrap());
+        let [base, half, twice] = [0.01, 0.005, 0.02].map(|eps| {
+            let mut session = session(&knot, &Config { curvature: true, eps, ..predicted([256, 256], 16) });
+            session.frame([1, 0]).unwrap();
+            Frame::read(&mut session)
+        });
+        let covered = base.ids.iter().filter(|id| **id != 0).count() as f64;
+        let changed =
+            [&half, &twice].map(|other| base.levels.iter().zip(&other.levels).filter(|(a, b)| a != b).count() as f64 / covered);
+        println!("{material}: another level at half the threshold {:.3}, at twice {:.3}", changed[0], changed[1]);
+        assert!(changed.iter().all(|c| *c < 0.12), "{material}: {changed:?}");
+    }
+}
+
 #[test]
 fn textures_ask_for_finer_levels() {
     let config = Config { lmax: 5, ..predicted([160, 120], 64) };
     let mut floor = plane(ggx(0.6, DVec3::splat(0.04), DVec3::splat(0.9)), sky("studio"));
     let plain = mean_level(&floor, &config);
-    // An image that the floor shows a tenth of asks for a tenth.
+    // An image that the floor shows a tenth of asks for a tenth. Inside their squares, checks are flat.
     let textured = [0.1, 1.0].map(|tiling| {
         floor.materials[0].maps = Maps { tiling: [tiling; 2], ..checks(8) };
         mean_level(&floor, &config)
     });
     println!("mean level: {plain} plain, {textured:?} with checks shown large and small");
-    assert!(plain > 4.5 && textured[0] < plain - 0.5 && textured[1] < textured[0] - 2.0 && textured[1] < 1.0);
+    assert!(plain > 4.5 && textured[0] < plain - 0.5 && textured[1] < textured[0] - 2.0 && textured[1] < 2.0);
+}
+
+/// Of a map that is flat on one side and checked on the other, only the checks are shaded finely.
+#[test]
+fn textures_are_read_where_they_are_seen() {
+    let config = Config { lmax: 5, curvature: true, ..predicted([160, 120], 64) };
+    let mut floor = plane(ggx(0.6, DVec3::splat(0.04), DVec3::splat(0.9)), sky("studio"));
+    floor.materials[0].maps = half_checks();
+    let mut session = session(&floor, &config);
+    session.frame([1, 0]).unwrap();
+    let frame = Frame::read(&mut session);
+    let (coordinates, _) = prediction::texels(&mut session, "coordinate");
+    // Away from the seams, where wavelets reach over.
+    let within = |least: f64| {
+        let seen = coordinates.iter().zip(&frame.levels).zip(&frame.ids);
+        let kept = seen.filter(|((uv, _), id)| **id != 0 && (least..least + 0.3).contains(&uv[0].rem_euclid(1.0)));
+        let levels: Vec<_> = kept.map(|((_, level), _)| f64::from(*level)).collect();
+        assert!(levels.len() > 500);
+        levels.iter().sum::<f64>() / levels.len() as f64
+    };
+    let (flat, checks) = (within(0.1), within(0.6));
+    println!("mean level {flat} where the map is flat, {checks} where it is checked");
+    assert!(flat > checks + 3.0 && checks < 1.5, "{flat} {checks}");
 }
 
 #[test]

@@ -11,9 +11,9 @@ use passband::reflectance::{Ggx, Model};
 use passband::sampling::{LatLong, sobol};
 use passband::{Config, Rate, Requirements, glam};
 
-/// The device's bandwidth of `map`, row-major, and its columns.
-fn on_device(map: &LatLong) -> (Vec<f32>, usize) {
-    let config = Config { rate: Rate::Bandwidth, ..Config::new([8, 8]) };
+/// The device's bandwidth of `map` at threshold `eps`, row-major, and its columns.
+fn on_device(map: &LatLong, eps: f64) -> (Vec<f32>, usize) {
+    let config = Config { rate: Rate::Bandwidth, eps, ..Config::new([8, 8]) };
     let options = Options { device: Some("llvmpipe".into()), validate: true };
     let headless = Headless::new(&options, &Requirements::of(&config)).unwrap();
     let camera = Camera { position: DVec3::Z, target: DVec3::ZERO, up: DVec3::Y, fov_y: 40.0 };
@@ -38,9 +38,9 @@ fn noise(width: u32, height: u32) -> LatLong {
 }
 
 /// Largest relative difference from the twin, of blocks whose bandwidth is above a hundredth of the largest.
-fn compare(name: &str, map: &LatLong, bound: f64) {
-    let (got, width) = on_device(map);
-    let twin = AngularBandwidth::of(map, EPS).map;
+fn compare(name: &str, map: &LatLong, eps: f64, bound: f64) {
+    let (got, width) = on_device(map, eps);
+    let twin = AngularBandwidth::of(map, eps).map;
     assert_eq!((twin.width, twin.values.len()), (width, got.len()), "{name}");
     let largest = twin.values.iter().copied().fold(0.0, f64::max);
     let mut errors: Vec<f64> =
@@ -54,19 +54,22 @@ fn compare(name: &str, map: &LatLong, bound: f64) {
 /// Details travel as 16-bit floats: 2^-11 of each, which the slope of the sums between levels can raise.
 #[test]
 fn the_device_agrees_with_its_twin() {
-    compare("cosine-64", &builtin::environment("cosine-64", 1024).unwrap(), 3e-3);
-    compare("cosine-200", &builtin::environment("cosine-200", 512).unwrap(), 3e-3);
-    compare("sun-sky", &builtin::environment("sun-sky", 1024).unwrap(), 3e-3);
-    compare("studio", &builtin::environment("studio", 512).unwrap(), 3e-3);
+    compare("cosine-64", &builtin::environment("cosine-64", 1024).unwrap(), EPS, 3e-3);
+    compare("cosine-200", &builtin::environment("cosine-200", 512).unwrap(), EPS, 3e-3);
+    compare("sun-sky", &builtin::environment("sun-sky", 1024).unwrap(), EPS, 3e-3);
+    compare("studio", &builtin::environment("studio", 512).unwrap(), EPS, 3e-3);
+    for eps in [0.001, 0.1] {
+        compare(&format!("sun-sky at {eps}"), &builtin::environment("sun-sky", 256).unwrap(), eps, 3e-3);
+    }
     for size in [[64, 32], [128, 128], [32, 64], [100, 50], [33, 17], [2, 1], [3, 3], [1, 1], [4100, 6], [3, 1500]] {
-        compare(&format!("noise {size:?}"), &noise(size[0], size[1]), 3e-3);
+        compare(&format!("noise {size:?}"), &noise(size[0], size[1]), EPS, 3e-3);
     }
 }
 
 #[test]
 fn flat_and_dark_light_have_none() {
     for radiance in [0.0, 1.0, 1e4] {
-        let (got, _) = on_device(&LatLong::new(64, 32, vec![[radiance; 3]; 64 * 32]).unwrap());
+        let (got, _) = on_device(&LatLong::new(64, 32, vec![[radiance; 3]; 64 * 32]).unwrap(), EPS);
         assert!(got.iter().all(|&b| b == 0.0), "{radiance}");
     }
 }
@@ -91,6 +94,10 @@ fn the_command_reports_and_plots_an_environment() {
     assert!(code == Some(2) && text.contains("nothing.exr"), "{text}");
     let (code, text) = passband(&["environment", "studio", "--eps", "2"]);
     assert!(code == Some(2) && text.contains("--eps"), "{text}");
+    let (code, text) = passband(&["environment", "studio", "--calibrate"]);
+    assert!(code == Some(2) && text.contains("--calibrate"), "{text}");
+    let (code, text) = passband(&["environment"]);
+    assert!(code == Some(2) && text.contains("FILE|NAME"), "{text}");
     let (code, text) = passband(&["environment", "studio", "-o", "plot.jpg"]);
     assert!(code == Some(2) && text.contains(".png"), "{text}");
 }

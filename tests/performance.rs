@@ -8,7 +8,8 @@ use passband::offline::scene::Scene;
 use passband::offline::session::Session;
 use passband::offline::stats::Quantiles;
 use passband::offline::world::World;
-use passband::{Config, Estimator, Requirements};
+use passband::{Config, Estimator, Rate, Renderer, Requirements};
+use std::time::Instant;
 
 const ROUNDS: usize = 9;
 
@@ -124,4 +125,49 @@ fn sixty_four_materials_against_one() {
     let mean = times[1..].iter().zip([9.0, 24.0, 16.0, 15.0]).map(|(t, n)| t * n / 64.0).sum::<f64>();
     println!("64 materials take {:.2} times what one takes, over their kinds", times[0] / mean);
     assert!(times[0] <= 1.3 * mean, "{times:.1?}");
+}
+
+/// What a new environment takes, host and device, without its analysis and with it: the least of many turns, on a shared machine.
+#[test]
+#[ignore = "needs a quiet machine"]
+fn an_environment_that_changes() {
+    let map = passband::offline::builtin::environment("sun-sky", 1024).unwrap();
+    let mut renderers = [Rate::Full, Rate::Bandwidth].map(|rate| {
+        let config = Config { rate, ..Config::new([16, 16]) };
+        let options = Options { device: std::env::var("PASSBAND_DEVICE").ok(), validate: false };
+        let mut headless = Headless::new(&options, &Requirements::of(&config)).unwrap();
+        let (host, memory) = headless.parts().unwrap();
+        // SAFETY: the handles live in `headless`, which is dropped after the renderer is destroyed.
+        let renderer = unsafe { Renderer::new(&host, &config, memory) }.unwrap();
+        (headless, renderer)
+    });
+    let mut least = [[f64::INFINITY; 2]; 2];
+    for turn in 0..24 {
+        for i in [turn % 2, (turn + 1) % 2] {
+            let (headless, renderer) = &mut renderers[i];
+            let mut host = 0.0;
+            let clock = Instant::now();
+            let record = headless.submit(|cmd, memory| {
+                // SAFETY: the command buffer is recording and submitted at once.
+                let bag = unsafe { renderer.record_environment(cmd, &map, memory) }?;
+                host = clock.elapsed().as_secs_f64() * 1e3;
+                Ok(bag)
+            });
+            record.unwrap();
+            let device = clock.elapsed().as_secs_f64() * 1e3 - host;
+            least[i] = [least[i][0].min(host), least[i][1].min(device)];
+        }
+    }
+    let [[host, device], [host_too, device_too]] = least;
+    println!(
+        "a map of 1024x512: host {host:.1} ms, device {device:.1} ms; with its analysis {host_too:.1} and {device_too:.1} ms"
+    );
+    println!("the analysis takes {:.1} ms on the device", device_too - device);
+    for (mut headless, renderer) in renderers {
+        let bag = renderer.destroy();
+        let (host, memory) = headless.parts().unwrap();
+        // SAFETY: every submission was waited for.
+        unsafe { bag.free(host.device, memory) };
+    }
+    assert!(device_too - device < 10.0);
 }

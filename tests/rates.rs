@@ -3,6 +3,7 @@
 #[path = "support/levels.rs"]
 mod support;
 
+use passband::frequency::luminance::{NOTICEABLE, levels as by_contrast};
 use passband::offline::headless::Options;
 use passband::offline::levels;
 use passband::offline::rates::{Rate, oracle};
@@ -43,11 +44,10 @@ fn the_oracle_shades_less_than_bandwidth_at_no_more_error() {
 #[test]
 fn contrast_of_the_frame_before_steers_luminance() {
     let world = scene("trio");
-    let config = config(Own::Given);
+    let config = config(Own::Luminance);
     let mut session = session(&world, &config);
     let device = Options { device: Some("llvmpipe".into()), validate: true };
-    Rate::Luminance.prepare(&mut session, &world, &config, &device, 0).unwrap();
-    Rate::Luminance.follow(&mut session, &config).unwrap();
+    Rate::from(Own::Luminance).prepare(&mut session, &world, &config, &device, 0).unwrap();
     session.frame([0, 0]).unwrap();
     let shaded = levels::shaded(&mut session).unwrap();
     let surface = support::surface(&mut session, &world, &config);
@@ -62,4 +62,33 @@ fn contrast_of_the_frame_before_steers_luminance() {
     let value = |i: usize| image[i][0] + image[i][1] + image[i][2];
     assert!((0..image.len()).all(|i| surface.samples[i].is_none() || value(i) > 0.0));
     assert_eq!(session.messages(), [""; 0]);
+}
+
+/// The levels of a frame follow from what the frame before it resolved to, and those of the first from nothing.
+#[test]
+fn levels_by_contrast_are_the_twins() {
+    for (extent, side) in [([160, 120], 1), ([93, 67], 1), ([61, 35], 2), ([8, 3], 4)] {
+        let world = scene("trio");
+        let config = Config { extent, samples_per_side: side, directions: 16, ..config(Own::Luminance) };
+        let mut session = session(&world, &config);
+        session.frame([0, 0]).unwrap();
+        let level = |session: &mut passband::offline::session::Session| -> Vec<u32> {
+            bytemuck::pod_collect_to_vec(&session.image("level").unwrap().0)
+        };
+        assert!(level(&mut session).iter().all(|l| *l == 0), "nothing was there to look at");
+        let (mut borders, mut coarse) = (0, 0);
+        for frame in 1..4 {
+            let previous: Vec<[f32; 4]> = bytemuck::pod_collect_to_vec(&session.image("resolved").unwrap().0);
+            session.frame([0, frame]).unwrap();
+            // Sums are in 32 bits: tiles within 1e-4 of a threshold may have either level.
+            let [least, most] = [1.0 - 1e-4, 1.0 + 1e-4].map(|f| by_contrast(&previous, extent, side, NOTICEABLE * f));
+            for ((got, least), most) in level(&mut session).into_iter().zip(&least).zip(&most) {
+                assert!((u32::from(*least)..=u32::from(*most)).contains(&got), "{extent:?} {side}: {least} {got} {most}");
+                borders += usize::from(least != most);
+                coarse += usize::from(got > 0);
+            }
+        }
+        assert!((coarse > 0 || side == 4) && borders <= 2 * 64 * (side * side) as usize, "{extent:?} {side}: {coarse} {borders}");
+        assert_eq!(session.messages(), [""; 0]);
+    }
 }

@@ -108,7 +108,6 @@ fn keys_that_work() {
 fn keys_that_do_not_work_yet_say_so() {
     let mut lines = Vec::new();
     let settings = [
-        "eps = 0.01",
         "np_rule = 'constant'",
         "np_rule = 'eq8'",
         "np_rule = 'sqrt'",
@@ -206,6 +205,7 @@ fn values_are_checked() {
         ("material", "roughness = 'alpha'", 13, "roughness_map"),
         ("material", "[settings]\noperator = 'sphere'", 14, "settings.operator"),
         ("material", "[settings]\neps = 1.5", 14, "settings.eps"),
+        ("material", "[settings]\neps = 0.0001", 14, "settings.eps"),
         ("material", "[settings]\nlmax = 6", 14, "settings.lmax"),
         ("material", "[settings]\nanisotropy = 17", 14, "settings.anisotropy"),
         ("material", "[settings]\nbudget = 0", 14, "settings.budget"),
@@ -357,8 +357,8 @@ fn overrides_are_checked_like_the_file() {
     }
     let deep = vec!["a"; 100_000].join(".");
     assert!(matches!(load_text(BASE, &[(&deep, "1")]), Err(Error::Argument { .. })));
-    let e = load_text(BASE, &[("settings.eps", "0.5")]).unwrap_err();
-    assert_eq!(e.to_string(), "--set settings.eps is not supported yet");
+    let e = load_text(BASE, &[("settings.eps0", "0.5")]).unwrap_err();
+    assert_eq!(e.to_string(), "--set settings.eps0 is not supported yet");
     // A mistake in the file stays the file's.
     let e = load_text(&with("camera", "fov = 3"), &[("environment.intensity", "2")]).unwrap_err();
     assert!(matches!(e, Error::File { at: At::Line(3), .. }), "{e}");
@@ -439,6 +439,7 @@ fn settings_reach_the_frame() {
     assert_eq!(load("combine = 'mean'").combine(), Combine::Mean);
     assert_eq!(load("combine = 'max'").combine(), Combine::Max);
     assert_eq!((load("lmax = 5").lmax(), load("geometric = true").geometric()), (Some(5), true));
+    assert_eq!((load("eps = 0.02").eps(), load("").eps()), (Some(0.02), None));
     let none = load("");
     assert_eq!((none.operator(), none.combine(), none.lmax(), none.geometric()), (Operator::Clipped, Combine::Mean, None, false));
 }

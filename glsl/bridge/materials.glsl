@@ -43,7 +43,7 @@ struct MaterialRecord {
     vec4 f0;
     vec4 albedo;
     vec4 importance; // first of its importance tables; the number of the last step; log2 of alpha squared of the first; steps per log2
-    vec4 texture_bandwidth; // x: of its colour and roughness maps, in cycles per texture unit
+    vec4 texture_bandwidth; // x: first of its maps' cells in texture_bandwidth.glsl, 0 without maps; yz: tiling
 };
 
 layout(set = 1, binding = 0, std430) readonly buffer Materials {

@@ -65,6 +65,13 @@ impl AngularBandwidth {
         }
     }
 
+    /// The share of the blocks that another analysis of the same environment puts at another whole level (power of two).
+    pub fn other_levels(&self, other: &Self) -> f64 {
+        let level = |b: f64| if b > 0.0 { b.log2().floor() } else { f64::NEG_INFINITY };
+        let changed = self.map.values.iter().zip(&other.map.values).filter(|(a, b)| level(**a) != level(**b)).count();
+        changed as f64 / self.map.values.len().max(1) as f64
+    }
+
     /// The bandwidth around direction `w` (unit), of the nearest block.
     pub fn towards(&self, w: DVec3) -> f64 {
         let uv = uv(w);

@@ -5,8 +5,10 @@
 //! spatial cycles/metre (textures: cycles per texture unit), image cycles/pixel. Wavelet estimates are divided by their bias
 //! ([`wavelet::bias`]).
 
+pub mod calibration;
 pub mod environment;
 pub mod level;
+pub mod luminance;
 pub mod operators;
 pub mod reconstruction;
 pub mod texture;
@@ -14,4 +16,4 @@ pub mod wavelet;
 
 pub use environment::AngularBandwidth;
 pub use operators::Operator;
-pub use texture::TextureBandwidth;
+pub use texture::{TextureBandwidth, TextureCells};

@@ -40,6 +40,8 @@ pub struct Settings {
     pub operator: Operator,
     /// How it combines its probes.
     pub combine: Combine,
+    /// Details below this share of the largest do not count in its analyses.
+    pub eps: f64,
     /// How materials are read.
     pub filter: Filter,
     /// Whether the mesh's curvature widens lobes, whatever the filter.
@@ -74,6 +76,7 @@ impl Settings {
             samples_per_cycle: base.samples_per_cycle,
             operator: base.operator,
             combine: base.combine,
+            eps: base.eps,
             filter: base.filter,
             geometric: base.geometric,
             samples: base.directions,
@@ -108,6 +111,7 @@ impl Settings {
             samples_per_cycle: self.samples_per_cycle,
             operator: self.operator,
             combine: self.combine,
+            eps: self.eps,
             filter: self.filter,
             geometric: self.geometric,
             directions: self.reference.map_or(self.samples, |n| n.min(REFERENCE_CHUNK)),
@@ -144,7 +148,6 @@ pub fn render(world: &World, settings: &Settings, progress: &mut dyn FnMut(u32, 
     // A frame's times arrive when its slot is recorded again.
     let mut timings: Vec<FrameTimings> = Vec::new();
     for frame in 0..if settings.timed { WARM_UP + TIMED } else { 0 } {
-        rate.follow(&mut session, &config)?;
         session.frame([settings.seed, 0])?;
         if frame >= WARM_UP {
             timings.extend(session.timings().cloned());
@@ -175,7 +178,6 @@ pub(super) fn image(
     let chunks = settings.chunks();
     let mut sum: Vec<f64> = Vec::new();
     for chunk in 0..chunks {
-        settings.rate().follow(session, config)?;
         session.frame([settings.seed, number.wrapping_mul(chunks).wrapping_add(chunk)])?;
         each(session);
         let (bytes, ..) = session.image("resolved")?;
@@ -243,6 +245,7 @@ pub(super) fn report(
         ("spc", json!(config.samples_per_cycle)),
         ("operator", json!(format!("{:?}", config.operator).to_lowercase())),
         ("combine", json!(format!("{:?}", config.combine).to_lowercase())),
+        ("eps", json!(config.eps)),
         ("geometric", json!(config.geometric)),
         ("estimator", json!(estimator)),
         ("samples", json!(config.directions)),

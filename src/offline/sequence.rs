@@ -75,7 +75,6 @@ pub fn render_frames(
         }
     }
     for _ in 0..repeated {
-        rate.follow(&mut session, &config)?;
         session.frame([settings.seed, frames.end - 1])?;
         times.extend(session.timings().cloned());
         done += 1;

@@ -127,7 +127,7 @@ impl Session {
         if config.rate == crate::Rate::Bandwidth {
             let folder = lobe_cache::cache_folder();
             let analyse = |m: &mut crate::Material| {
-                m.lobe_bandwidth = Some(Arc::new(lobe_cache::lobe_bandwidth(&m.model, folder.as_deref())));
+                m.lobe_bandwidth = Some(Arc::new(lobe_cache::lobe_bandwidth(&m.model, config.eps, folder.as_deref())));
             };
             materials.iter_mut().for_each(analyse);
         }

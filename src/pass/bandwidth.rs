@@ -13,7 +13,7 @@ use crate::gpu::recorder::Recorder;
 use crate::gpu::retire::Retired;
 use crate::gpu::sampler::Samplers;
 use crate::pass::environment::EnvironmentImages;
-use crate::pass::materials::MaterialImages;
+use crate::pass::materials::{Bandwidths, MaterialImages};
 use crate::pass::{PassContext, classify, level, pyramid};
 use ash::vk::DescriptorType as D;
 use bytemuck::{Pod, Zeroable};
@@ -48,6 +48,7 @@ pub const INTERFACE: Interface = Interface {
         D::COMBINED_IMAGE_SAMPLER,
         D::STORAGE_IMAGE,
         D::STORAGE_IMAGE,
+        D::STORAGE_BUFFER,
         D::STORAGE_BUFFER,
         D::STORAGE_BUFFER,
         D::STORAGE_BUFFER,
@@ -107,8 +108,8 @@ pub(crate) struct Io<'a> {
     /// Its bandwidth in cycles/radian.
     pub environment_bandwidth: &'a Image,
     pub materials: &'a MaterialImages,
-    /// Their lobes' bandwidths in cycles/radian.
-    pub lobe_bandwidth: &'a Image,
+    /// How fast their lobes and textures vary.
+    pub material_bandwidths: &'a Bandwidths,
     /// Of the `filter` pass.
     pub normals: &'a Image,
     pub factors: &'a Image,
@@ -167,7 +168,8 @@ impl Bandwidth {
         io.environment.sampled(rec);
         io.materials.sampled(rec);
         rec.image(io.environment_bandwidth, Access::COMPUTE_SAMPLED);
-        rec.image(io.lobe_bandwidth, Access::COMPUTE_SAMPLED);
+        rec.image(&io.material_bandwidths.lobes, Access::COMPUTE_SAMPLED);
+        rec.buffer(&io.material_bandwidths.textures, Access::COMPUTE_READ);
         rec.image(io.normals, Access::COMPUTE_SAMPLED);
         rec.image(io.factors, Access::COMPUTE_SAMPLED);
         level::clear(rec, io.level, 0);
@@ -205,12 +207,13 @@ impl Bandwidth {
             Resource::Sampled(io.normals, io.samplers.nearest),
             Resource::Sampled(io.factors, io.samplers.nearest),
             Resource::Sampled(io.environment_bandwidth, io.samplers.nearest),
-            Resource::Sampled(io.lobe_bandwidth, io.samplers.nearest),
+            Resource::Sampled(&io.material_bandwidths.lobes, io.samplers.nearest),
             Resource::Storage(io.level.view),
             Resource::Storage(io.prediction.view),
             Resource::Buffer(io.lights),
             Resource::Buffer(io.forecast),
             Resource::Buffer(io.blocks),
+            Resource::Buffer(&io.material_bandwidths.textures),
         ];
         let pipeline = &self.pipelines[usize::from(io.light_count > 0)];
         let push = Push { all, ..self.push };

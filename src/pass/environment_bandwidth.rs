@@ -4,7 +4,7 @@
 //! Luminance on a grid, one dispatch a level of the transform, the details that cover each block, one frequency a 2x2 block.
 
 use crate::error::Result;
-use crate::frequency::environment::{EPS, analysed, scale};
+use crate::frequency::environment::{analysed, scale};
 use crate::frequency::wavelet::bias;
 use crate::gpu::access::Access;
 use crate::gpu::image::{Image, ImageDesc};
@@ -91,16 +91,19 @@ pub(crate) struct EnvironmentBandwidth {
     level: [ComputePipeline; 2],
     spread: ComputePipeline,
     texel: ComputePipeline,
+    eps: f64,
 }
 
 impl EnvironmentBandwidth {
-    pub fn new(p: &mut PassContext<'_, '_>) -> Result<Self> {
+    /// Details below `eps` of the largest do not count.
+    pub fn new(p: &mut PassContext<'_, '_>, eps: f64) -> Result<Self> {
         let mut make = |interface, constants: &[u32]| ComputePipeline::new(p.build, p.modules, interface, p.bridge, 0, constants);
         Ok(Self {
             luminance: [make(&LUMINANCE, &[0])?, make(&LUMINANCE, &[1])?],
             level: [make(&LEVEL, &[0])?, make(&LEVEL, &[1])?],
             spread: make(&SPREAD, &[])?,
             texel: make(&TEXEL, &[])?,
+            eps,
         })
     }
 
@@ -187,7 +190,7 @@ impl EnvironmentBandwidth {
         rec.overwrite(&work.bandwidth, Access::COMPUTE_WRITE);
         rec.flush();
         let size = [width as i32, height as i32];
-        let push = TexelPush { size, levels: levels as i32, eps: EPS as f32, bias: bias(EPS) as f32 };
+        let push = TexelPush { size, levels: levels as i32, eps: self.eps as f32, bias: bias(self.eps) as f32 };
         self.texel.bind_set(rec, work.sets[3].sets[0], &push);
         self.texel.dispatch(rec, [width.div_ceil(4), height.div_ceil(4)]);
         rec.end();

@@ -41,6 +41,7 @@ struct Record {
     f0: [f32; 4],
     albedo: [f32; 4],
     importance: [f32; 4],
+    /// Where its cells begin among the texture bandwidths; tiling.
     texture_bandwidth: [f32; 4],
 }
 
@@ -53,8 +54,8 @@ pub(crate) struct MaterialImages {
     importance: Image,
     density: Image,
     pub maps: MapImages,
-    /// Of the lobes, in cycles/radian, if the frame predicts bandwidth.
-    pub lobe_bandwidth: Option<Image>,
+    /// Of the lobes and the textures, if the frame predicts bandwidth.
+    pub bandwidths: Option<Bandwidths>,
 }
 
 /// Created and filled, not yet recorded.
@@ -65,7 +66,15 @@ pub(crate) struct MaterialsUpload {
     importance: ImageUpload,
     density: ImageUpload,
     maps: MapsUpload,
-    lobe_bandwidth: Option<ImageUpload>,
+    bandwidths: Option<(ImageUpload, BufferUpload)>,
+}
+
+/// What the prediction of bandwidth knows of the materials.
+pub(crate) struct Bandwidths {
+    /// Of the lobes, in cycles/radian.
+    pub lobes: Image,
+    /// Of the textures, in cycles per unit of the surface's coordinates: a 0 for materials without, then the cells of the others.
+    pub textures: Buffer,
 }
 
 /// Where table number `i` of `count` stands in the atlas, and the atlas's size, in tables along theta_d and theta_h: as square
@@ -152,9 +161,33 @@ fn records(materials: &[Material], tables: &Tables<'_>, importance: &[[f32; 4]],
     records
 }
 
+/// The bandwidths of lobes and textures of `materials`, whose records learn where theirs are.
+fn bandwidths(
+    build: &mut Build<'_>,
+    materials: &[Material],
+    records: &mut [Record],
+    eps: f64,
+) -> Result<(ImageUpload, BufferUpload)> {
+    let extent = [bandwidth::WIDTH as u32, (bandwidth::SIDE * materials.len()) as u32, 1];
+    let desc = ImageDesc::new("lobe bandwidth", vk::Format::R32_SFLOAT, extent, vk::ImageUsageFlags::SAMPLED);
+    let lobes = ImageUpload::new(build, desc, bytemuck::cast_slice(&atlas::lobe_bandwidths(materials, eps)))?;
+    let mut cells = vec![0.0f32];
+    for (material, record) in materials.iter().zip(records) {
+        let [u, v] = material.maps.tiling;
+        record.texture_bandwidth = [0.0, u, v, 0.0];
+        if let Some(found) = material.texture_bandwidth(eps) {
+            // Exact: 64 materials have fewer cells than 2^24.
+            record.texture_bandwidth[0] = cells.len() as f32;
+            cells.extend_from_slice(found.values());
+        }
+    }
+    let usage = vk::BufferUsageFlags::STORAGE_BUFFER;
+    Ok((lobes, BufferUpload::new(build, "texture bandwidth", usage, bytemuck::cast_slice(&cells))?))
+}
+
 impl MaterialsUpload {
-    /// `widened` says whether a filter widens lobes, `predicted` whether the frame predicts bandwidth.
-    pub fn new(build: &mut Build<'_>, materials: &[Material], widened: bool, predicted: bool) -> Result<Self> {
+    /// `widened` says whether a filter widens lobes, `eps` at which threshold bandwidths are analysed, if the frame predicts it.
+    pub fn new(build: &mut Build<'_>, materials: &[Material], widened: bool, eps: Option<f64>) -> Result<Self> {
         if materials.is_empty() || materials.len() > MAX_MATERIALS {
             return Err(Error::invalid("materials", format!("1 to {MAX_MATERIALS}"), materials.len()));
         }
@@ -174,11 +207,7 @@ impl MaterialsUpload {
         let firsts = ladders.iter().scan(0, |next, ladder| Some(std::mem::replace(next, *next + ladder.steps())));
         let places: Vec<_> = ladders.iter().zip(firsts).map(|(ladder, first)| ladder.record(first)).collect();
         let mut records = records(materials, &tables, &places, size[0]);
-        let lobes = predicted.then(|| atlas::lobe_bandwidths(materials));
-        if predicted {
-            let bandwidths = materials.iter().map(|m| m.texture_bandwidth() as f32);
-            records.iter_mut().zip(bandwidths).for_each(|(record, b)| record.texture_bandwidth = [b; 4]);
-        }
+        let bandwidths = eps.map(|eps| bandwidths(build, materials, &mut records, eps)).transpose()?;
         let importance = atlas::importance_tables(materials, &ladders);
         let image = |name, format, extent| ImageDesc::new(name, format, extent, vk::ImageUsageFlags::SAMPLED);
         let table_extent = [PHI_DIFF as u32, THETA_DIFF as u32 * size[0], THETA_HALF as u32 * size[1]];
@@ -201,13 +230,7 @@ impl MaterialsUpload {
                 bytemuck::cast_slice(&density),
             )?,
             maps: MapsUpload::new(build, materials)?,
-            lobe_bandwidth: lobes
-                .map(|texels| {
-                    let extent = [bandwidth::WIDTH as u32, (bandwidth::SIDE * materials.len()) as u32, 1];
-                    let desc = image("lobe bandwidth", vk::Format::R32_SFLOAT, extent);
-                    ImageUpload::new(build, desc, bytemuck::cast_slice(&texels))
-                })
-                .transpose()?,
+            bandwidths,
         })
     }
 
@@ -224,7 +247,9 @@ impl MaterialsUpload {
             importance: self.importance.record(rec, bag),
             density: self.density.record(rec, bag),
             maps: self.maps.record(rec, bag),
-            lobe_bandwidth: self.lobe_bandwidth.map(|upload| upload.record(rec, bag)),
+            bandwidths: self
+                .bandwidths
+                .map(|(lobes, textures)| Bandwidths { lobes: lobes.record(rec, bag), textures: textures.record(rec, bag) }),
         }
     }
 }
@@ -239,7 +264,12 @@ impl MaterialImages {
     pub fn retire(self, states: &mut States, bag: &mut Retired) {
         states.forget(self.records.handle);
         self.records.retire(bag);
-        for image in [self.tables, self.importance, self.density].into_iter().chain(self.lobe_bandwidth) {
+        let (lobes, textures) = self.bandwidths.map(|b| (b.lobes, b.textures)).unzip();
+        if let Some(buffer) = textures {
+            states.forget(buffer.handle);
+            buffer.retire(bag);
+        }
+        for image in [self.tables, self.importance, self.density].into_iter().chain(lobes) {
             states.forget(image.handle);
             image.retire(bag);
         }

@@ -9,6 +9,7 @@ pub mod environment_bandwidth;
 pub mod filter;
 pub mod gbuffer;
 pub(crate) mod level;
+pub mod luminance;
 pub(crate) mod maps;
 pub mod materials;
 pub mod modules;
@@ -53,5 +54,6 @@ pub fn interfaces() -> Vec<Interface> {
     all.extend([shade::INTERFACE, upsample::INTERFACE, resolve::INTERFACE]);
     all.extend(tonemap::INTERFACES);
     all.extend(environment_bandwidth::INTERFACES);
+    all.extend(luminance::INTERFACES);
     all
 }

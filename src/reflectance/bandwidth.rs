@@ -6,7 +6,7 @@
 //! Beside [`analytic`] the estimate reads 1.1 to 1.5 times for Gaussian lobes (concentrations 1000 to 10) and 1.1 to 2 times for
 //! GGX, whose tails go on: on the safe side.
 
-use crate::frequency::environment::{EPS, FLOOR};
+use crate::frequency::environment::FLOOR;
 use crate::frequency::wavelet::{Grid, LocalFrequency};
 use crate::reflectance::{Model, Reflectance, turned};
 use crate::sampling::luminance;
@@ -36,9 +36,9 @@ pub struct LobeBandwidth {
 }
 
 impl LobeBandwidth {
-    /// Analyses the luminance of `model`. Where turning the surface matters, the largest over four turns counts. Lobes too
+    /// Analyses the luminance of `model` at threshold `eps`. Where turning the surface matters, the largest over four turns counts. Lobes too
     /// narrow for the slices (a GGX alpha below 0.02 or so) have their analytic bandwidth in every direction.
-    pub fn build(model: &Model) -> Self {
+    pub fn build(model: &Model, eps: f64) -> Self {
         let turns = if model.isotropic() { 1 } else { TURNS };
         let mut tiles = vec![0.0; SIDE * SIDE * SIDE];
         // Independent tiles, a few at a time: each takes some ten megabytes while it is made.
@@ -49,7 +49,9 @@ impl LobeBandwidth {
                         let theta = view_angle(4 * first + angle);
                         match analytic(model, theta.cos()).filter(|narrow| narrow.deviation < RESOLVED * SPACING) {
                             Some(narrow) => tile.fill(narrow.bandwidth as f32),
-                            None => (0..turns).for_each(|k| analyse(model, theta, TAU * k as f64 / (2 * turns) as f64, tile)),
+                            None => {
+                                (0..turns).for_each(|k| analyse(model, eps, [theta, TAU * k as f64 / (2 * turns) as f64], tile));
+                            }
                         }
                     }
                 });
@@ -76,7 +78,8 @@ impl LobeBandwidth {
     }
 
     /// The strip from the mean of the tiles and their first `components` principal components (section 2.4, figure 8), and its
-    /// error: the root of the squared differences over that of the squared values.
+    /// error: the root of the squared differences over that of the squared values. A study: strips are so small (16 KiB) that
+    /// nothing keeps or reads them in this form.
     pub fn compressed(&self, components: usize) -> (Self, f64) {
         let tile = |angle: usize| move |i: usize| (i / SIDE) * WIDTH + angle * SIDE + i % SIDE;
         let all: Vec<Vec<f64>> = (0..SIDE).map(|a| (0..WIDTH).map(|i| f64::from(self.texels[tile(a)(i)])).collect()).collect();
@@ -101,6 +104,13 @@ impl LobeBandwidth {
             }
         }
         (Self { texels }, error)
+    }
+
+    /// The fewest principal components that hold `share` of the energy around the mean of the tiles.
+    pub fn components_for(&self, share: f64) -> usize {
+        let lost = |components| self.compressed(components).1.powi(2);
+        let most = (1.0 - share) * lost(0);
+        (0..SIDE).find(|&components| lost(components) <= most).unwrap_or(SIDE)
     }
 }
 
@@ -137,8 +147,8 @@ fn view_angle(angle: usize) -> f64 {
     (angle as f64 + 0.5) / SIDE as f64 * FRAC_PI_2
 }
 
-/// Raises `tile` to the bandwidths of one slice, with the surface turned by `turn`.
-fn analyse(model: &Model, theta: f64, turn: f64, tile: &mut [f32]) {
+/// Raises `tile` to the bandwidths of one slice, seen at `theta` with the surface turned by `turn`.
+fn analyse(model: &Model, eps: f64, [theta, turn]: [f64; 2], tile: &mut [f32]) {
     let turn = DVec2::from_angle(turn);
     let wo = turned(turn, DVec3::new(theta.sin(), 0.0, theta.cos()));
     let values: Vec<f64> = (0..SLICE * SLICE)
@@ -149,7 +159,7 @@ fn analyse(model: &Model, theta: f64, turn: f64, tile: &mut [f32]) {
         .collect();
     let mean = values.iter().sum::<f64>() / values.len() as f64;
     let slice = Grid { width: SLICE, values };
-    let [across, down] = LocalFrequency::of(&slice, EPS, FLOOR * mean).axes;
+    let [across, down] = LocalFrequency::of(&slice, eps, FLOOR * mean).axes;
     // Blocks of two samples a side of a texel.
     let blocks = SLICE / 2 / SIDE;
     for (i, texel) in tile.iter_mut().enumerate() {

@@ -2,9 +2,8 @@
 #![allow(dead_code, reason = "each test file uses its part")]
 
 use glam::{DMat3, DVec2, DVec3};
-use passband::frequency::AngularBandwidth;
-use passband::frequency::environment::EPS;
 use passband::frequency::operators::{Combine, Probe, Surface, nearby, pixel_angle};
+use passband::frequency::{AngularBandwidth, TextureCells};
 use passband::offline::session::Session;
 use passband::offline::world::World;
 use passband::reflectance::{ImportanceTable, LobeBandwidth, Reflectance};
@@ -83,19 +82,21 @@ pub struct Predicted {
 /// What is known of a world before any frame.
 pub struct Twin<'a> {
     world: &'a World,
-    materials: Vec<(Material, ImportanceTable, LobeBandwidth)>,
+    materials: Vec<(Material, ImportanceTable, LobeBandwidth, Option<TextureCells>)>,
     environment: Option<AngularBandwidth>,
 }
 
 impl<'a> Twin<'a> {
-    pub fn new(world: &'a World) -> Self {
+    /// With the threshold of its frames.
+    pub fn new(world: &'a World, eps: f64) -> Self {
         let material = |m: &passband::offline::world::Material| {
             // Colour maps count with their mean: what a pixel sees that spans the whole.
             let surface = m.surface();
             let mean = surface.at(DVec2::ZERO, [DVec2::splat(1e6); 2]).reflectance(&m.model);
-            (surface, ImportanceTable::build(&mean), LobeBandwidth::build(&m.model))
+            let textures = surface.texture_bandwidth(eps);
+            (surface, ImportanceTable::build(&mean), LobeBandwidth::build(&m.model, eps), textures)
         };
-        let environment = world.environment.as_ref().map(|e| AngularBandwidth::of(&e.map, EPS));
+        let environment = world.environment.as_ref().map(|e| AngularBandwidth::of(&e.map, eps));
         Self { world, materials: world.materials.iter().map(material).collect(), environment }
     }
 
@@ -123,7 +124,7 @@ impl<'a> Twin<'a> {
             cosine: wo.z,
             pixel: pixel_angle(plane, [2.0 * wide / width, 2.0 * tan / height]),
         };
-        let (material, table, lobes) = &self.materials[(frame.ids[at] as usize - 1) & 0xffff];
+        let (material, table, lobes, textures) = &self.materials[(frame.ids[at] as usize - 1) & 0xffff];
         let [u, v, ..] = frame.coordinates[at];
         let [ux, vx, uy, vy] = frame.derivatives[at];
         let steps = [DVec2::new(ux, vx), DVec2::new(uy, vy)];
@@ -159,7 +160,10 @@ impl<'a> Twin<'a> {
             }
         }
         let longest = steps.iter().map(|d| d.length()).fold(0.0, f64::max);
-        let texture = (material.texture_bandwidth() * longest).min(0.5);
+        let tiling = DVec2::from(material.maps.tiling.map(f64::from));
+        let place = DVec2::new(u, v) * tiling;
+        let cycles = textures.as_ref().map_or(0.0, |cells| cells.at(place, longest * tiling.max_element()));
+        let texture = (cycles * longest).min(0.5);
         let mean = estimates.iter().sum::<f64>() / f64::from(config.probes);
         let squares = estimates.iter().map(|e| e * e).sum::<f64>() / f64::from(config.probes);
         let spread = if mean > 0.0 { (squares - mean * mean).max(0.0).sqrt() / mean } else { 0.0 };

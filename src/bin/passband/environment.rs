@@ -1,7 +1,9 @@
 //! `passband environment`: an environment and how fast it varies around each direction (Bagher et al. 2011, figure 7).
 
-use passband::frequency::AngularBandwidth;
+use crate::sheet::{RANGE, false_colour};
+use comfy_table::{Table, presets};
 use passband::frequency::environment::EPS;
+use passband::frequency::{AngularBandwidth, calibration, wavelet};
 use passband::offline::error::{Error, Result};
 use passband::offline::image_io::write_png;
 use passband::offline::{builtin, environment};
@@ -12,25 +14,25 @@ use std::time::Instant;
 
 /// Columns of either half of the plot.
 const WIDTH: usize = 1024;
-/// Bandwidths in cycles/radian from black to white.
-const RANGE: [f64; 2] = [0.25, 128.0];
-/// False colour from slow to fast, dark to light so that it reads in grey too.
-const COLOURS: [[f64; 3]; 6] =
-    [[0.0, 0.0, 0.1], [0.2, 0.1, 0.5], [0.6, 0.15, 0.5], [0.9, 0.4, 0.3], [1.0, 0.75, 0.3], [1.0, 1.0, 0.85]];
-
 /// Reports an environment's angular bandwidth, and plots it beside the environment
 #[derive(clap::Args)]
 pub struct Args {
     /// A lat-long map (.exr, .hdr) or a built-in's name
-    #[arg(value_name = "FILE|NAME")]
-    environment: String,
+    #[arg(value_name = "FILE|NAME", required_unless_present = "calibrate")]
+    environment: Option<String>,
     /// Plot to write (.png)
     #[arg(short, long)]
     output: Option<PathBuf>,
     /// Details below this share of the largest do not count
     #[arg(long, default_value_t = EPS)]
     eps: f64,
+    /// Print what the estimate makes of light of one frequency at several --eps instead
+    #[arg(long, conflicts_with_all = ["environment", "output", "eps"])]
+    calibrate: bool,
 }
+
+/// Thresholds of the calibration.
+const THRESHOLDS: [f64; 8] = [0.001, 0.002, 0.005, 0.01, 0.02, 0.03, 0.05, 0.1];
 
 /// Runs the subcommand.
 pub fn run(args: &Args) -> Result<ExitCode> {
@@ -39,10 +41,10 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     {
         return Err(Error::argument("--output", "a name that ends in .png", output.display()));
     }
-    if !(1e-4..=0.5).contains(&args.eps) {
-        return Err(Error::argument("--eps", "a number from 0.0001 to 0.5", args.eps));
+    if !(1e-3..=0.1).contains(&args.eps) {
+        return Err(Error::argument("--eps", "a number from 0.001 to 0.1", args.eps));
     }
-    let name = args.environment.as_str();
+    let Some(name) = args.environment.as_deref() else { return calibrate() };
     let map = if builtin::ENVIRONMENTS.contains(&name) {
         builtin::environment(name, builtin::DEFAULT_WIDTH)?
     } else {
@@ -63,6 +65,15 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         at(0.95),
         at(1.0)
     ))?;
+    let changed = [0.5, 2.0].map(|factor| {
+        let other = AngularBandwidth::of(&map, (args.eps * factor).clamp(1e-3, 0.1));
+        bandwidth.other_levels(&other)
+    });
+    crate::print(format_args!(
+        "at another level at half of that and at twice: {:.1} % and {:.1} % of them",
+        100.0 * changed[0],
+        100.0 * changed[1]
+    ))?;
     if let Some(output) = &args.output {
         write_png(output, 2 * WIDTH as u32, WIDTH as u32 / 2, &plot(&map, &bandwidth))?;
         crate::print(format_args!(
@@ -72,6 +83,29 @@ pub fn run(args: &Args) -> Result<ExitCode> {
             RANGE[1]
         ))?;
     }
+    Ok(ExitCode::SUCCESS)
+}
+
+fn calibrate() -> Result<ExitCode> {
+    let mut table = Table::new();
+    table.load_style(presets::NOTHING).set_header([
+        "eps",
+        "bias",
+        "measured",
+        "median over truth",
+        "of a wave, least",
+        "greatest",
+        "5 % of places",
+        "95 %",
+    ]);
+    for eps in THRESHOLDS {
+        let found = calibration::reading(eps)?;
+        let bias = wavelet::bias(eps);
+        let [low, high] = found.medians;
+        let numbers = [found.median, low, high, found.spread[0], found.spread[1]].map(|x| format!("{x:.3}"));
+        table.add_row([format!("{eps}"), format!("{bias:.2}"), format!("{:.2}", bias * found.median)].into_iter().chain(numbers));
+    }
+    crate::print(format_args!("the estimate of one frequency, in three directions and at three frequencies:\n{table}"))?;
     Ok(ExitCode::SUCCESS)
 }
 
@@ -95,11 +129,4 @@ fn plot(map: &LatLong, bandwidth: &AngularBandwidth) -> Vec<u8> {
         [r, g, b, 255]
     };
     (0..WIDTH * WIDTH).flat_map(pixel).collect()
-}
-
-fn false_colour(bandwidth: f64) -> [f64; 3] {
-    let along = (bandwidth.max(1e-9) / RANGE[0]).ln() / (RANGE[1] / RANGE[0]).ln();
-    let x = along.clamp(0.0, 1.0) * (COLOURS.len() - 1) as f64;
-    let [a, b] = [x as usize, (x as usize + 1).min(COLOURS.len() - 1)].map(|i| COLOURS.get(i).copied().unwrap_or_default());
-    [0, 1, 2].map(|c| a[c] + (b[c] - a[c]) * x.fract())
 }

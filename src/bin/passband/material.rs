@@ -2,12 +2,13 @@
 
 use comfy_table::{Table, presets};
 use glam::DVec3;
+use passband::frequency::environment::EPS;
 use passband::offline::error::{Error, Result};
 use passband::offline::lobe_cache::{self, lobe_bandwidth};
 use passband::offline::scene::{read_merl, read_rgl, read_sgd};
 use passband::reflectance::analysis::{HIGHLIGHT, albedo, highlight, reciprocity_error};
 use passband::reflectance::bake::{self, BakeError};
-use passband::reflectance::{MerlTable, Model, Reflectance, stand_in};
+use passband::reflectance::{LobeBandwidth, MerlTable, Model, Reflectance, stand_in};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -49,9 +50,9 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         return Err(Error::argument("--output", "a name that ends in .png", output.display()));
     }
     let subject = load(&args.material)?;
-    report(&subject)?;
+    let bandwidth = report(&subject)?;
     if let Some(output) = &args.output {
-        plot::write(output, &subject.title, subject.reflectance.as_ref())?;
+        plot::write(output, &subject.title, subject.reflectance.as_ref(), &bandwidth)?;
         crate::print(format_args!("\nplot: {}", output.display()))?;
     }
     Ok(ExitCode::SUCCESS)
@@ -102,7 +103,8 @@ fn packed(table: &MerlTable) -> Model {
     Model::Table(MerlTable::unpacked(scale, &entries).into())
 }
 
-fn report(subject: &Subject) -> Result<()> {
+/// Returns the bandwidth of its lobes.
+fn report(subject: &Subject) -> Result<LobeBandwidth> {
     let reflectance = subject.reflectance.as_ref();
     crate::print(format_args!("{}\n\nreflected share of light, over the view angle:", subject.title))?;
     let mut table = Table::new();
@@ -124,7 +126,7 @@ fn report(subject: &Subject) -> Result<()> {
     table.add_row(["table on the GPU, relative error".into(), error]);
     crate::print(table)?;
     crate::print(format_args!("\nangular bandwidth of the lobe around the mirror direction, over the view angle:"))?;
-    let bandwidth = lobe_bandwidth(&subject.shaded, lobe_cache::cache_folder().as_deref());
+    let bandwidth = lobe_bandwidth(&subject.shaded, EPS, lobe_cache::cache_folder().as_deref());
     let mut table = Table::new();
     table.load_style(presets::NOTHING).set_header(["degrees", "cycles/radian"]);
     for degrees in ANGLES {
@@ -134,5 +136,7 @@ fn report(subject: &Subject) -> Result<()> {
     }
     crate::print(table)?;
     let errors = COMPONENTS.map(|k| format!("{k}: {:.3}", bandwidth.compressed(k).1)).join(", ");
-    crate::print(format_args!("\nits relative error from the mean and so many principal components: {errors}"))
+    crate::print(format_args!("\nits relative error from the mean and so many principal components: {errors}"))?;
+    crate::print(format_args!("components that hold 95 % of its energy around the mean: {}", bandwidth.components_for(0.95)))?;
+    Ok(bandwidth)
 }

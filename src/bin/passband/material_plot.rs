@@ -1,16 +1,21 @@
 //! The plot of `passband material`: lobes, slices and energy on one sheet.
 
-use crate::sheet::{self, Area, Drawn, legend};
+use crate::sheet::{self, Area, Drawn, RANGE, false_colour, legend};
 use glam::DVec3;
 use passband::offline::error::Result;
-use passband::reflectance::Reflectance;
 use passband::reflectance::analysis::{albedo, at};
+use passband::reflectance::bandwidth::{SIDE, WIDTH};
+use passband::reflectance::{LobeBandwidth, Reflectance};
 use passband::sampling::luminance;
 use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::*;
 use std::path::Path;
 
-const SIZE: (u32, u32) = (1600, 1200);
+const SIZE: (u32, u32) = (1600, 1800);
+/// Rows of the sheet below the other panels.
+const STRIPS: i32 = 640;
+/// Principal components of the strips that are shown below the whole one.
+const COMPONENTS: [usize; 4] = [4, 2, 1, 0];
 /// The lobes' view angles in degrees.
 const VIEWS: [f64; 4] = [0.0, 30.0, 60.0, 80.0];
 /// Colours of the lobes, told apart in grey too.
@@ -25,14 +30,16 @@ const CELLS: usize = 180;
 type Chart<'a, 'b> = ChartContext<'a, BitMapBackend<'b>, Cartesian2d<RangedCoordf64, RangedCoordf64>>;
 
 /// Draws `reflectance` and writes it as a PNG.
-pub fn write(path: &Path, title: &str, reflectance: &dyn Reflectance) -> Result<()> {
+pub fn write(path: &Path, title: &str, reflectance: &dyn Reflectance, bandwidth: &LobeBandwidth) -> Result<()> {
     sheet::write(path, SIZE, title, |root| {
-        let panels = root.split_evenly((2, 2));
+        let (upper, strips_at) = root.split_vertically(SIZE.1 as i32 - STRIPS);
+        let panels = upper.split_evenly((2, 2));
         let [lobes_at, slice_at, image_at, energy_at] = panels.as_slice() else { return Err("the sheet has four panels".into()) };
         lobes(lobes_at, reflectance)?;
         slice(slice_at, reflectance)?;
         image(image_at, reflectance)?;
-        energy(energy_at, reflectance)
+        energy(energy_at, reflectance)?;
+        strips(&strips_at, bandwidth)
     })
 }
 
@@ -164,6 +171,28 @@ fn energy(area: &Area<'_>, reflectance: &dyn Reflectance) -> Drawn {
     for (c, (name, colour)) in CHANNELS.into_iter().enumerate() {
         let points = values.iter().map(|(x, rgb)| (*x, rgb.to_array()[c])).collect();
         curve(&mut chart, points, colour, name.into())?;
+    }
+    Ok(())
+}
+
+/// Bandwidth over light directions, a tile a view angle, and what few principal components make of it (Bagher 2011, figure 8).
+fn strips(area: &Area<'_>, bandwidth: &LobeBandwidth) -> Drawn {
+    const CELL: i32 = 6;
+    const STEP: i32 = SIDE as i32 * CELL + 26;
+    let text = |text: String, y: i32| area.draw(&Text::new(text, (16, y), ("sans-serif", 20)));
+    let range = format!("(black {} to white {} cycles/radian)", RANGE[0], RANGE[1]);
+    let whole = (format!("Bandwidth of the lobe, viewer at 0 to 90 degrees {range}"), bandwidth.clone());
+    let few = COMPONENTS.into_iter().map(|k| {
+        let (strip, error) = bandwidth.compressed(k);
+        (format!("mean and {k} principal components: relative error {error:.3}"), strip)
+    });
+    for (row, (caption, strip)) in (0..).zip(std::iter::once(whole).chain(few)) {
+        text(caption, row * STEP)?;
+        for (i, value) in (0..).zip(strip.texels()) {
+            let [r, g, b] = false_colour(f64::from(*value)).map(|c| (255.0 * c).round() as u8);
+            let (x, y) = (16 + i % WIDTH as i32 * CELL, row * STEP + 22 + i / WIDTH as i32 * CELL);
+            area.draw(&Rectangle::new([(x, y), (x + CELL, y + CELL)], RGBColor(r, g, b).filled()))?;
+        }
     }
     Ok(())
 }

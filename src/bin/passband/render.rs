@@ -2,6 +2,7 @@
 
 use clap::ValueEnum;
 use indicatif::{ProgressBar, ProgressStyle};
+use passband::frequency::environment::EPS;
 use passband::offline::error::{Error, Result};
 use passband::offline::headless::Options;
 use passband::offline::image_io::{LinearImage, check_writable, write_atomically, write_image};
@@ -46,8 +47,8 @@ pub struct Args {
     /// How materials are read at a pixel's scale
     #[arg(long, default_value = "point")]
     filter: String,
-    /// Probes of the bandwidth prediction (4), 1 to 64 a block of 2x2 samples
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=64))]
+    /// Probes of the bandwidth prediction (4), 1 to 256 a block of 2x2 samples
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=256))]
     probes: Option<u32>,
     /// Samples that a predicted cycle gets: a number, or auto (2 at 64 samples, rising with their root)
     #[arg(long, value_name = "X|auto", default_value = "auto", value_parser = samples_per_cycle)]
@@ -179,7 +180,7 @@ impl Args {
             Rate::Half => passband::Rate::Uniform(1).into(),
             Rate::Quarter => passband::Rate::Uniform(2).into(),
             Rate::Bandwidth => passband::Rate::Bandwidth.into(),
-            Rate::Luminance => rates::Rate::Luminance,
+            Rate::Luminance => passband::Rate::Luminance.into(),
             Rate::Oracle => rates::Rate::Oracle,
         };
         let estimator = match self.estimator {
@@ -207,6 +208,7 @@ impl Args {
             samples_per_cycle: self.spc.0,
             operator: scene.map(Scene::operator).unwrap_or_default(),
             combine: scene.map(Scene::combine).unwrap_or_default(),
+            eps: scene.and_then(Scene::eps).unwrap_or(EPS),
             filter,
             geometric: scene.is_some_and(Scene::geometric),
             samples: self.samples,

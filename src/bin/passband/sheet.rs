@@ -8,6 +8,12 @@ use plotters::prelude::*;
 use plotters::style::{FontStyle, register_font};
 use std::path::Path;
 
+/// Bandwidths in cycles/radian from black to white.
+pub const RANGE: [f64; 2] = [0.25, 128.0];
+/// False colour from slow to fast, dark to light so that it reads in grey too.
+const COLOURS: [[f64; 3]; 6] =
+    [[0.0, 0.0, 0.1], [0.2, 0.1, 0.5], [0.6, 0.15, 0.5], [0.9, 0.4, 0.3], [1.0, 0.75, 0.3], [1.0, 1.0, 0.85]];
+
 /// A part of a sheet.
 pub type Area<'a> = DrawingArea<BitMapBackend<'a>, Shift>;
 /// What drawing returns.
@@ -52,4 +58,12 @@ where
         .label_font(("sans-serif", 18))
         .draw()?;
     Ok(())
+}
+
+/// The colour of a bandwidth in cycles/radian, each channel in 0..1.
+pub fn false_colour(bandwidth: f64) -> [f64; 3] {
+    let along = (bandwidth.max(1e-9) / RANGE[0]).ln() / (RANGE[1] / RANGE[0]).ln();
+    let x = along.clamp(0.0, 1.0) * (COLOURS.len() - 1) as f64;
+    let [a, b] = [x as usize, (x as usize + 1).min(COLOURS.len() - 1)].map(|i| COLOURS.get(i).copied().unwrap_or_default());
+    [0, 1, 2].map(|c| a[c] + (b[c] - a[c]) * x.fract())
 }

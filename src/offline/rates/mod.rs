@@ -1,7 +1,6 @@
-//! Rates that `bandwidth` is compared with: what shipped image-based variable-rate shading does, and the least that any rate
-//! needs. Both give [`crate::Rate::Given`] its levels and are worked out on the CPU, outside of the frame's time.
+//! The renderer's rates, and one that they are compared with: the least that any rate needs, which is worked out on the CPU, outside of
+//! the frame's time, and given to [`crate::Rate::Given`].
 
-pub mod luminance;
 pub mod oracle;
 
 use crate::Config;
@@ -15,8 +14,6 @@ use crate::offline::world::World;
 pub enum Rate {
     /// As the renderer itself decides.
     Own(crate::Rate),
-    /// By the contrast of the frame before ([`luminance`]).
-    Luminance,
     /// With the fewest samples for the error of [`crate::Rate::Bandwidth`] ([`oracle`]).
     Oracle,
 }
@@ -32,14 +29,13 @@ impl Rate {
     pub fn of_renderer(self) -> crate::Rate {
         match self {
             Self::Own(rate) => rate,
-            Self::Luminance | Self::Oracle => crate::Rate::Given,
+            Self::Oracle => crate::Rate::Given,
         }
     }
 
     /// As `--rate` calls it.
     pub fn name(self) -> &'static str {
         match self {
-            Self::Luminance => "luminance",
             Self::Oracle => "oracle",
             Self::Own(crate::Rate::Full) => "full",
             Self::Own(crate::Rate::Uniform(1)) => "half",
@@ -47,6 +43,7 @@ impl Rate {
             Self::Own(crate::Rate::Uniform(_)) => "uniform",
             Self::Own(crate::Rate::Given) => "given",
             Self::Own(crate::Rate::Bandwidth) => "bandwidth",
+            Self::Own(crate::Rate::Luminance) => "luminance",
         }
     }
 
@@ -57,28 +54,12 @@ impl Rate {
     /// The device's.
     pub fn prepare(self, session: &mut Session, world: &World, config: &Config, device: &Options, seed: u32) -> Result<()> {
         match self {
-            Self::Own(_) => Ok(()),
-            Self::Luminance => {
-                let samples = config.extent.map(|e| (e * config.samples_per_side) as usize);
-                session.set_levels(&vec![0; samples[0] * samples[1]])?;
+            Self::Own(crate::Rate::Luminance) => {
                 session.frame([seed, 1])?;
-                self.follow(session, config)?;
                 session.frame([seed, 2])
             }
+            Self::Own(_) => Ok(()),
             Self::Oracle => session.set_levels(&oracle::levels(world, config, device, seed)?),
         }
-    }
-
-    /// What comes before every frame: `luminance` looks at the frame before.
-    ///
-    /// # Errors
-    /// The device's.
-    pub fn follow(self, session: &mut Session, config: &Config) -> Result<()> {
-        if self != Self::Luminance {
-            return Ok(());
-        }
-        let (bytes, ..) = session.image("resolved")?;
-        let previous: Vec<[f32; 4]> = bytemuck::pod_collect_to_vec(&bytes);
-        session.set_levels(&luminance::levels(&previous, config.extent, config.samples_per_side, luminance::NOTICEABLE))
     }
 }

@@ -10,7 +10,8 @@ impl Check<'_> {
         self.each(&s.combine, |c, v| c.name(v, &["mean", "max"]))?;
         self.each(&s.np_rule, |c, v| c.name(v, &["constant", "eq8", "sqrt", "relstd"]))?;
         self.each(&s.bins, |c, v| c.name(v, &["camera", "tangent"]))?;
-        for threshold in [&s.eps, &s.eps0, &s.eps1] {
+        self.each(&s.eps, |c, v| c.number(v, "0.001 to 0.1", |v| (1e-3..=0.1).contains(&v)))?;
+        for threshold in [&s.eps0, &s.eps1] {
             self.each(threshold, |c, v| c.number(v, "0 < threshold < 1", |v| v > 0.0 && v < 1.0))?;
         }
         self.each(&s.budget, |c, v| c.number(v, "a number above 0", |v| v > 0.0))?;
@@ -18,7 +19,6 @@ impl Check<'_> {
         self.each(&s.anisotropy, |c, v| c.number(v, "1 to 16", |v| (1.0..=16.0).contains(&v)))?;
         self.each(&s.lod_bias, |c, v| c.number(v, "-16 to 16", |v| v.abs() <= 16.0))?;
         let all = [
-            span(&s.eps),
             span(&s.np_rule),
             span(&s.budget),
             span(&s.bins),

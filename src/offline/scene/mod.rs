@@ -123,6 +123,11 @@ impl Scene {
         }
     }
 
+    /// The share of the largest detail below which details do not count in analyses, if the scene says.
+    pub fn eps(&self) -> Option<f64> {
+        self.file.settings.eps.as_ref().map(|v| *v.get_ref())
+    }
+
     /// Whether the mesh's curvature widens lobes, whatever the filter.
     pub fn geometric(&self) -> bool {
         self.file.settings.geometric.as_ref().is_some_and(|v| *v.get_ref())

@@ -1,10 +1,12 @@
 //! Levels by the contrast of the frame before, tile by tile: Yang et al. 2019, "Visually Lossless Content and Motion Adaptive
 //! Shading in Games", without motion, as nothing moves between the two frames. It cannot tell noise from detail, nor what a
-//! coarsely shaded tile hides.
+//! coarsely shaded tile hides. Twin of `glsl/luminance/`.
 
 use crate::sampling::luminance;
 use glam::DVec3;
 
+/// The coarsest level, of a quarter of the pixels a side.
+pub const COARSEST: u32 = 2;
 /// Output pixels a side of a tile.
 pub const TILE: usize = 8;
 /// The error that is not noticed, as a share of a tile's mean luminance. Of 0.03 to 0.3 this is where the torus knot, the bumpy
