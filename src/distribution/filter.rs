@@ -124,13 +124,7 @@ impl Storage {
     /// Which lobe or cell of a texel its lobe `i` adds to.
     fn slot(self, i: usize, lobe: &Lobe) -> usize {
         match self {
-            Self::Directions { apart } | Self::Slopes { apart } => {
-                if apart {
-                    i
-                } else {
-                    0
-                }
-            }
+            Self::Directions { apart } | Self::Slopes { apart } => i * usize::from(apart),
             Self::Cells(cells) => cells.of(lobe.mu),
         }
     }
@@ -145,7 +139,7 @@ impl Storage {
             }
             Self::Slopes { apart } => {
                 let b = slope::of(lobe.mu);
-                let baked = 1.0 / lobe.kappa.max(LEAST_SPREAD);
+                let baked = slope::variance(lobe.kappa);
                 let [xx, xy, yy] = if apart { slope::carried(b, lobe.kappa) } else { [baked, 0.0, baked] };
                 [w * b.x, w * b.y, w * (b.x * b.x + xx), w * (b.x * b.y + xy), w * (b.y * b.y + yy), w]
             }
@@ -231,7 +225,7 @@ impl<'a> Filtered<'a> {
         let kappa = match self.filter {
             Filter::Fixed => self.constant,
             // Toksvig's factor |N| / (|N| + s (1 - |N|)) on the exponent s.
-            Filter::Toksvig | Filter::ToksvigLobe => mean * length / (length + mean * (1.0 - length)).max(LEAST_SPREAD),
+            Filter::Toksvig | Filter::ToksvigLobe => mean * length / (length + mean * (1.0 - length)).max(f64::MIN_POSITIVE),
             _ => mean,
         };
         Some(Lobe { mu: sum.try_normalize().unwrap_or(DVec3::Z), kappa, weight })

@@ -10,8 +10,8 @@ struct Level {
 }
 
 /// The mips over a map whose texels are computed when they are asked for. Each side is half of the one before, rounded up, so
-/// that no texel covers more than two by two; each texel is the average of the area that it covers, and thus the average of
-/// the last level is that of the map at any size.
+/// that no texel has more than the area of two by two; each is the average of the area that it covers, so that the average of
+/// every level is that of the map at any size.
 #[derive(Clone, Debug)]
 pub struct Mips {
     size: [u32; 2],

@@ -14,6 +14,9 @@ pub const LEAST_COSINE: f64 = 0.08;
 /// The least variance along an axis.
 const LEAST_VARIANCE: f64 = 1e-7;
 
+/// Lobes of less concentration count as this: the slopes of an even lobe have no variance.
+const LEAST_CONCENTRATION: f64 = 1e-2;
+
 /// One lobe.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Lobe {
@@ -30,10 +33,15 @@ pub fn of(m: DVec3) -> DVec2 {
     -m.truncate() / m.z.max(LEAST_COSINE)
 }
 
-/// The covariance of slopes of a sharp lobe of concentration `kappa` about slope `b`: its own, `1 / kappa` each way about its
-/// mean direction, times the derivative of slopes by directions there: `(1 + b.b) (I + b b^T) / kappa`.
+/// The variance of slopes, each way, of a sharp lobe of concentration `kappa` about the normal.
+pub fn variance(kappa: f64) -> f64 {
+    1.0 / kappa.max(LEAST_CONCENTRATION)
+}
+
+/// The covariance of slopes of a sharp lobe of concentration `kappa` about slope `b`: its own, [`variance`] each way about its mean
+/// direction, times the derivative of slopes by directions there: `(1 + b.b) (I + b b^T) / kappa`.
 pub fn carried(b: DVec2, kappa: f64) -> [f64; 3] {
-    let scale = (1.0 + b.length_squared()) / kappa.max(LEAST_VARIANCE);
+    let scale = (1.0 + b.length_squared()) * variance(kappa);
     [scale * (1.0 + b.x * b.x), scale * b.x * b.y, scale * (1.0 + b.y * b.y)]
 }
 
