@@ -1,9 +1,8 @@
 //! SGD, Blinn-Phong, vMF mixtures and turned tables: values, normalisation, reciprocity, refusals, baking.
 
 use glam::{DVec2, DVec3};
-use passband::reflectance::{
-    BlinnPhong, Lobe, MerlTable, Model, Reflectance, Sgd, TurnedTables, Vmf, bake, sgd_table, turned, vmf,
-};
+use passband::distribution::vmf;
+use passband::reflectance::{BlinnPhong, Lobe, MerlTable, Model, Reflectance, Sgd, TurnedTables, Vmf, bake, sgd_table, turned};
 use passband::sampling::sobol;
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use std::sync::Arc;

@@ -1,4 +1,5 @@
-// Von Mises-Fisher lobes (src/reflectance/vmf.rs is the f64 twin).
+// Von Mises-Fisher lobes (src/distribution/vmf.rs is the f64 twin). The spread is the complement to 1 of the length of a lobe's
+// mean vector: of sharp lobes it is what 32 bits can tell.
 #ifndef VMF_GLSL
 #define VMF_GLSL
 #include "angles.glsl"
@@ -10,12 +11,47 @@ float vmf_normalisation(float kappa) {
     return kappa > 0.0 ? kappa * 0.5 * INV_PI / complement : 0.25 * INV_PI;
 }
 
+// The density per steradian at unit h of a lobe about unit mu, of integral 1; from |h - mu|^2, which sharp lobes need.
+float vmf_density(vec3 mu, float kappa, vec3 h) {
+    vec3 d = h - mu;
+    return vmf_normalisation(kappa) * exp(-0.5 * kappa * dot(d, d));
+}
+
+const float VMF_SERIES_BELOW = 0.5; // where the closed forms would cancel
+const float VMF_LEAST_SPREAD = 1e-7;
+
+float vmf_mean_cosine_series(float kappa) {
+    float square = kappa * kappa;
+    return kappa * (1.0 / 3.0 - square * (1.0 / 45.0 - square * (2.0 / 945.0 - square * (1.0 / 4725.0))));
+}
+
 // coth kappa - 1/kappa: the length of a lobe's mean vector.
 float vmf_mean_cosine(float kappa) {
-    float square = kappa * kappa;
-    float series = kappa * (1.0 / 3.0 - square * (1.0 / 45.0 - square * (2.0 / 945.0 - square * (1.0 / 4725.0))));
     float e = exp(-2.0 * kappa);
-    return kappa < 0.5 ? series : (1.0 + e) / (1.0 - e) - 1.0 / kappa;
+    return kappa < VMF_SERIES_BELOW ? vmf_mean_cosine_series(kappa) : (1.0 + e) / (1.0 - e) - 1.0 / kappa;
+}
+
+// 1 - vmf_mean_cosine(kappa).
+float vmf_spread(float kappa) {
+    float e = exp(-2.0 * kappa);
+    return kappa < VMF_SERIES_BELOW ? 1.0 - vmf_mean_cosine_series(kappa) : 1.0 / kappa - 2.0 * e / (1.0 - e);
+}
+
+// The concentration of a lobe of this spread, which is clamped to at least VMF_LEAST_SPREAD and at most 1: Banerjee's estimate
+// (within 5 %) and two Newton steps, each of which squares the relative error.
+float vmf_concentration(float spread) {
+    float s = clamp(spread, VMF_LEAST_SPREAD, 1.0);
+    float r = 1.0 - s;
+    float kappa = r * (3.0 - r * r) / (s * (2.0 - s));
+    for (int i = 0; i < 2; i++) {
+        float square = kappa * kappa, e = exp(-2.0 * kappa), rest = 1.0 - e;
+        bool series = kappa < VMF_SERIES_BELOW;
+        float off = series ? vmf_mean_cosine_series(kappa) - r : s - (1.0 / kappa - 2.0 * e / rest);
+        float slope = series ? 1.0 / 3.0 - square * (1.0 / 15.0 - square * (2.0 / 189.0 - square * (1.0 / 675.0 - square * (2.0 / 10395.0))))
+                             : 1.0 / square - 4.0 * e / (rest * rest);
+        kappa -= off / slope;
+    }
+    return kappa;
 }
 
 #endif

@@ -64,7 +64,7 @@ impl Reflectance for Ggx {
 
 /// Density of microfacet normals at unit `h`, per steradian. Written in the squared sine, not 1 - cos^2, so that sharp lobes
 /// keep their precision.
-pub(super) fn distribution(alpha: f64, h: DVec3) -> f64 {
+pub(crate) fn distribution(alpha: f64, h: DVec3) -> f64 {
     let a = alpha * alpha;
     let sine = h.x * h.x + h.y * h.y;
     a / (PI * (sine + a * h.z * h.z).powi(2))

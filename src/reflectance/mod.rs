@@ -12,7 +12,7 @@ pub(crate) mod atlas;
 pub mod bake;
 pub mod bandwidth;
 pub mod blinn_phong;
-mod cavity;
+pub(crate) mod cavity;
 pub mod frame;
 pub mod ggx;
 pub mod half_row;
@@ -28,6 +28,7 @@ pub mod stand_in;
 pub mod turned;
 pub mod vmf;
 
+pub use crate::distribution::vmf::Lobe;
 pub use bandwidth::LobeBandwidth;
 pub use blinn_phong::BlinnPhong;
 pub use ggx::Ggx;
@@ -36,7 +37,7 @@ pub use merl::MerlTable;
 pub use rgl::Rgl;
 pub use sgd::Sgd;
 pub use turned::TurnedTables;
-pub use vmf::{Lobe, Vmf};
+pub use vmf::Vmf;
 
 /// What is wrong with a binary reflectance file.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]

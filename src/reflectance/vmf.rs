@@ -1,28 +1,17 @@
 //! Mixtures of von Mises-Fisher lobes of microfacet normals (Xu et al. 2017, "Real-time linear BRDF MIP-mapping",
-//! equations 6 and 14). Twin of `glsl/include/vmf.glsl`.
+//! equations 6 and 14).
 
+use crate::distribution::vmf::{Lobe, mean_cosine, normalisation};
 use crate::error::{Error, Result};
 use crate::reflectance::half_row::Rows;
 use crate::reflectance::{Reflectance, cavity};
 use glam::DVec3;
-use std::f64::consts::PI;
 
 /// Lobes that a mixture may have.
 pub const MAX_LOBES: usize = 8;
 
 /// The least projected area of a mixture, as a share of its weight: with less, the surface would face away from its normal.
-const LEAST_PROJECTED_AREA: f64 = 0.05;
-
-/// One lobe: `weight c(kappa) e^(kappa (mu.h - 1))` per steradian of h.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Lobe {
-    /// Mean direction in the tangent frame.
-    pub mu: DVec3,
-    /// Concentration, at least 0.
-    pub kappa: f64,
-    /// Weight, at least 0.
-    pub weight: f64,
-}
+pub(crate) const LEAST_PROJECTED_AREA: f64 = 0.05;
 
 /// `f = D G / (4 cos cos)`: D is the lobes' mixture over the projected area that Xu's characteristic vectors give it,
 /// `n . sum(w r) / sum(w)` with `r = (coth kappa - 1/kappa) mu`, so that the integral of D cos over the sphere is the sum of
@@ -155,21 +144,6 @@ impl Reflectance for Vmf {
     }
 }
 
-/// `kappa / (2 pi (1 - e^(-2 kappa)))`, the density of a lobe at its centre; `1 / (4 pi)` at 0.
-pub fn normalisation(kappa: f64) -> f64 {
-    if kappa < 1e-12 { 1.0 / (4.0 * PI) } else { kappa / (2.0 * PI * -(-2.0 * kappa).exp_m1()) }
-}
-
-/// `coth kappa - 1/kappa`, the length of a lobe's mean vector; by its series where the difference would cancel.
-pub fn mean_cosine(kappa: f64) -> f64 {
-    if kappa < 0.05 {
-        let square = kappa * kappa;
-        kappa * (1.0 / 3.0 - square * (1.0 / 45.0 - square * (2.0 / 945.0)))
-    } else {
-        1.0 / kappa.tanh() - 1.0 / kappa
-    }
-}
-
 /// `e^-x I0(x)` for x >= 0 (Abramowitz and Stegun 9.8.1 and 9.8.2, relative error below 3e-7).
 fn bessel_i0_scaled(x: f64) -> f64 {
     let polynomial = |coefficients: &[f64], t: f64| coefficients.iter().rev().fold(0.0, |sum, c| sum * t + c);
@@ -203,11 +177,5 @@ mod tests {
             let error = bessel_i0_scaled(x) / (i0 * (-x).exp()) - 1.0;
             assert!(error.abs() < 3e-7, "{x}: {error:e}");
         }
-        // The two forms of the mean cosine meet.
-        assert!((mean_cosine(0.05 - 1e-12) - mean_cosine(0.05 + 1e-12)).abs() < 1e-12);
-        assert_eq!(mean_cosine(0.0), 0.0);
-        assert!((mean_cosine(1e6) - (1.0 - 1e-6)).abs() < 1e-12);
-        assert!((normalisation(1e-9) * 4.0 * PI - 1.0).abs() < 1e-8);
-        assert!((normalisation(1.0) - 0.184_065_5).abs() < 1e-7);
     }
 }

@@ -55,52 +55,57 @@ pub(super) fn chain<const N: usize>(format: Format, size: [u32; 2], source: impl
 }
 
 fn averages<const N: usize>(from: [u32; 2], to: [u32; 2], texel: impl Fn(usize) -> [f32; N]) -> Vec<[f32; N]> {
-    let (columns, rows) = (axis_weights(from[0], to[0]), axis_weights(from[1], to[1]));
-    let mut out = Vec::with_capacity(columns.len() * rows.len());
-    for row in &rows {
-        for column in &columns {
-            let mut sum = [0.0f64; N];
-            for (y, along_y) in row.iter() {
-                for (x, along_x) in column.iter() {
-                    let value = texel(y * from[0] as usize + x);
-                    for (sum, c) in sum.iter_mut().zip(value) {
-                        *sum += along_x * along_y * f64::from(c);
-                    }
-                }
+    let mut out = Vec::with_capacity(to[0] as usize * to[1] as usize);
+    for_each_cover(from, to, |_, covered| {
+        let mut sum = [0.0f64; N];
+        for (i, share) in covered {
+            for (sum, c) in sum.iter_mut().zip(texel(*i)) {
+                *sum += share * f64::from(c);
             }
-            out.push(sum.map(|c| c as f32));
+        }
+        out.push(sum.map(|c| c as f32));
+    });
+    out
+}
+
+/// Calls `visit` for each texel of a level of size `to`, row by row, with the texels that it covers of one of size `from`, and
+/// the share of each in its area. Any sizes above 0.
+pub(crate) fn for_each_cover(from: [u32; 2], to: [u32; 2], mut visit: impl FnMut(usize, &[(usize, f64)])) {
+    let (columns, rows) = (axis_weights(from[0], to[0]), axis_weights(from[1], to[1]));
+    let mut covered = Vec::new();
+    for (y, row) in rows.iter().enumerate() {
+        for (x, column) in columns.iter().enumerate() {
+            covered.clear();
+            for (source_y, along_y) in row.iter() {
+                covered
+                    .extend(column.iter().map(|(source_x, along_x)| (source_y * from[0] as usize + source_x, along_x * along_y)));
+            }
+            visit(y * columns.len() + x, &covered);
         }
     }
-    out
 }
 
 /// Neighbours that a texel covers: the first, and the share of each.
 struct Shares {
     first: usize,
-    shares: [f64; 3],
-    count: usize,
+    shares: Vec<f64>,
 }
 
 impl Shares {
     fn iter(&self) -> impl Iterator<Item = (usize, f64)> + '_ {
-        self.shares.iter().take(self.count).enumerate().map(|(i, share)| (self.first + i, *share))
+        self.shares.iter().enumerate().map(|(i, share)| (self.first + i, *share))
     }
 }
 
-/// Of each of `to` texels along an axis, what it covers of the `from` of the level before: at most three, as `from` is
-/// `to`, `2 to` or `2 to + 1`.
+/// Of each of `to` texels along an axis, what it covers of `from`.
 fn axis_weights(from: u32, to: u32) -> Vec<Shares> {
     let (from, to) = (u64::from(from), u64::from(to));
     let shares = |i: u64| {
         // In units of 1/to of a texel: whole numbers.
         let (start, end) = (i * from, (i + 1) * from);
         let first = start / to;
-        let last = (end - 1) / to;
-        let mut shares = [0.0; 3];
-        for (share, texel) in shares.iter_mut().zip(first..=last) {
-            *share = (end.min((texel + 1) * to) - start.max(texel * to)) as f64 / from as f64;
-        }
-        Shares { first: first as usize, shares, count: (last - first + 1) as usize }
+        let share = |texel: u64| (end.min((texel + 1) * to) - start.max(texel * to)) as f64 / from as f64;
+        Shares { first: first as usize, shares: (first..=(end - 1) / to).map(share).collect() }
     };
     (0..to).map(shares).collect()
 }

@@ -6,8 +6,8 @@ mod chain;
 pub mod classes;
 
 use crate::error::{Error, Result};
-pub(crate) use chain::decode_byte;
 use chain::{chain, encode_byte};
+pub(crate) use chain::{decode_byte, for_each_cover};
 use glam::{DVec2, DVec4, dvec4};
 use half::f16;
 

@@ -7,6 +7,7 @@ mod materials;
 mod sampling;
 #[path = "../support/statistics.rs"]
 mod statistics;
+mod vmf;
 
 use glam::{DVec3, Vec3};
 use passband::offline::headless::{Headless, Options};

@@ -1,0 +1,321 @@
+//! Filters of normal and BRDF maps: what each stores a texel, of which mips are averages, and the lobes that it decodes.
+
+use crate::distribution::brdf_map::BrdfMap;
+use crate::distribution::literal;
+use crate::distribution::mip::Mips;
+use crate::distribution::mixture::{Masking, Mixture};
+use crate::distribution::partition::Cells;
+use crate::distribution::slope;
+use crate::distribution::vmf::{self, LEAST_SPREAD, Lobe};
+use glam::{DVec2, DVec3};
+use std::ops::Range;
+
+/// A filter. Those without `Lobe` take a texel's lobes as one whose normals spread; the others keep the same lobe of all texels
+/// apart.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Filter {
+    /// Mean direction and mean concentration of each lobe.
+    Naive,
+    /// Mean direction of each lobe, with the map's mean concentration.
+    Fixed,
+    /// Toksvig 2005, "Mipmapping Normal Maps": a concentration reduced by the length of the mean direction.
+    Toksvig,
+    /// The same for each lobe.
+    ToksvigLobe,
+    /// Olano and Baker 2010, "LEAN Mapping": mean and covariance of slopes, into which `1 / kappa` is baked.
+    Lean,
+    /// The same for each lobe, with `1 / kappa` carried to the lobe's own slope ([`slope::carried`]).
+    LeanLobe,
+    /// Dupuy et al. 2013: LEAN's moments, from which masking follows, too.
+    Leadr,
+    /// Xu et al. 2017 with one lobe.
+    Vmf1,
+    /// With a lobe in each of four cells.
+    Vmf4,
+    /// With a lobe in each of eight cells.
+    Vmf8,
+    /// With as many cells as the spread within them asks for.
+    Vmf,
+}
+
+/// The lengths of the mean vector of one and of four cells below which Algorithm 1 takes more (epsilon 0 and 1).
+const PRINTED_LENGTHS: [f64; 2] = [0.95, 0.85];
+
+/// How much greater than its lobes' own spread a cell's spread may be before it is divided.
+const SPREAD_RATIO: f64 = 1.5;
+
+/// Numbers of a texel for each lobe of directions: weight times mean direction, times concentration, and weight.
+const DIRECTION: usize = 5;
+/// For each lobe of slopes: weight times mean slope and mean products xx, xy, yy, and weight.
+const SLOPE: usize = 6;
+/// For each cell: weight times characteristic vector, weight, and weight times the mean length of the characteristic vectors.
+const CELL: usize = 5;
+
+impl Filter {
+    /// All.
+    pub const ALL: [Self; 11] = [
+        Self::Naive,
+        Self::Fixed,
+        Self::Toksvig,
+        Self::ToksvigLobe,
+        Self::Lean,
+        Self::LeanLobe,
+        Self::Leadr,
+        Self::Vmf1,
+        Self::Vmf4,
+        Self::Vmf8,
+        Self::Vmf,
+    ];
+
+    /// The name by which it is asked for.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Naive => "naive",
+            Self::Fixed => "fixed",
+            Self::Toksvig => "toksvig",
+            Self::ToksvigLobe => "toksvig-lobe",
+            Self::Lean => "lean",
+            Self::LeanLobe => "lean-lobe",
+            Self::Leadr => "leadr",
+            Self::Vmf1 => "vmf1",
+            Self::Vmf4 => "vmf4",
+            Self::Vmf8 => "vmf8",
+            Self::Vmf => "vmf",
+        }
+    }
+
+    /// How its lobes are masked.
+    pub fn masking(self) -> Masking {
+        if self == Self::Leadr { Masking::Slopes } else { Masking::Cavities }
+    }
+
+    fn storage(self) -> Storage {
+        match self {
+            Self::Naive | Self::Fixed | Self::ToksvigLobe => Storage::Directions { apart: true },
+            Self::Toksvig => Storage::Directions { apart: false },
+            Self::Lean | Self::Leadr => Storage::Slopes { apart: false },
+            Self::LeanLobe => Storage::Slopes { apart: true },
+            Self::Vmf1 => Storage::Cells(Cells::One),
+            Self::Vmf4 => Storage::Cells(Cells::Four),
+            // Of which those of four and of one are sums.
+            Self::Vmf8 | Self::Vmf => Storage::Cells(Cells::Eight),
+        }
+    }
+}
+
+/// What is stored.
+#[derive(Clone, Copy)]
+enum Storage {
+    Directions { apart: bool },
+    Slopes { apart: bool },
+    Cells(Cells),
+}
+
+impl Storage {
+    /// Lobes or cells of a texel, and numbers of each.
+    fn layout(self, lobes: usize) -> (usize, usize) {
+        match self {
+            Self::Directions { apart } => (if apart { lobes } else { 1 }, DIRECTION),
+            Self::Slopes { apart } => (if apart { lobes } else { 1 }, SLOPE),
+            Self::Cells(cells) => (cells.count(), CELL),
+        }
+    }
+
+    /// Which lobe or cell of a texel its lobe `i` adds to.
+    fn slot(self, i: usize, lobe: &Lobe) -> usize {
+        match self {
+            Self::Directions { apart } | Self::Slopes { apart } => i * usize::from(apart),
+            Self::Cells(cells) => cells.of(lobe.mu),
+        }
+    }
+
+    /// What a lobe adds; as many numbers as [`Self::layout`] says.
+    fn encode(self, lobe: &Lobe, literal: bool) -> [f64; 6] {
+        let w = lobe.weight;
+        match self {
+            Self::Directions { .. } => {
+                let mu = w * lobe.mu;
+                [mu.x, mu.y, mu.z, w * lobe.kappa, w, 0.0]
+            }
+            Self::Slopes { apart } => {
+                let b = slope::of(lobe.mu);
+                let baked = slope::variance(lobe.kappa);
+                let [xx, xy, yy] = if apart { slope::carried(b, lobe.kappa) } else { [baked, 0.0, baked] };
+                [w * b.x, w * b.y, w * (b.x * b.x + xx), w * (b.x * b.y + xy), w * (b.y * b.y + yy), w]
+            }
+            Self::Cells(_) => {
+                let length = if literal { 1.0 - literal::spread(lobe.kappa) } else { vmf::mean_cosine(lobe.kappa) };
+                let r = w * length * lobe.mu;
+                [r.x, r.y, r.z, w, w * length, 0.0]
+            }
+        }
+    }
+}
+
+/// A map as a filter stores it, with its mips.
+#[derive(Clone, Debug)]
+pub struct Filtered<'a> {
+    filter: Filter,
+    map: &'a BrdfMap,
+    literal: bool,
+    /// The mean concentration of the map.
+    constant: f64,
+    mips: Mips,
+}
+
+impl<'a> Filtered<'a> {
+    /// `map` as `filter` stores it. `literal` takes for `vmf*` the paper's own relation of length and concentration (equations
+    /// 8 and 9) and its tests of length (Algorithm 1, with the weights of equation 15, without which energy would grow with the
+    /// number of cells).
+    pub fn new(filter: Filter, map: &'a BrdfMap, literal: bool) -> Self {
+        let constant =
+            map.lobes().iter().map(|l| l.weight * l.kappa).sum::<f64>() * map.lobes_per_texel() as f64 / map.lobes().len() as f64;
+        let (slots, stride) = filter.storage().layout(map.lobes_per_texel());
+        let mips = Mips::new(map.size(), slots * stride, |i, out| encode(filter.storage(), map.texel(i), literal, out));
+        Self { filter, map, literal, constant, mips }
+    }
+
+    /// How many levels there are.
+    pub fn levels(&self) -> usize {
+        self.mips.levels()
+    }
+
+    /// Width and height of a level.
+    pub fn size(&self, level: usize) -> [u32; 2] {
+        self.mips.size(level)
+    }
+
+    /// What is stored of texel `i` of a level, row by row; for level 0 what its mips average. `None` where there is none.
+    pub fn texel(&self, level: usize, i: usize) -> Option<Vec<f64>> {
+        if level > 0 {
+            return self.mips.texel(level, i).map(<[f64]>::to_vec);
+        }
+        let lobes = self.map.texel(i);
+        let (slots, stride) = self.filter.storage().layout(self.map.lobes_per_texel());
+        let mut out = vec![0.0; slots * stride];
+        encode(self.filter.storage(), lobes, self.literal, &mut out);
+        (!lobes.is_empty()).then_some(out)
+    }
+
+    /// The lobes of what is stored, or of an average of it.
+    pub fn decode(&self, texel: &[f64]) -> Mixture {
+        match self.filter.storage() {
+            Storage::Directions { .. } => Mixture::Vmf(texel.as_chunks().0.iter().filter_map(|t| self.direction(*t)).collect()),
+            Storage::Slopes { .. } => Mixture::Slopes(texel.as_chunks().0.iter().filter_map(|t| gaussian(*t)).collect()),
+            Storage::Cells(_) => {
+                let cells: Vec<Cell> = texel.as_chunks().0.iter().map(|t| Cell(*t)).collect();
+                let mut lobes = Vec::new();
+                if self.filter == Filter::Vmf {
+                    self.divide(&cells, 0, 1.0, &mut lobes);
+                } else {
+                    lobes.extend(cells.iter().filter_map(|cell| cell.lobe(self.literal, 1.0)));
+                }
+                Mixture::Vmf(lobes)
+            }
+        }
+    }
+
+    fn direction(&self, [x, y, z, kappa, weight]: [f64; DIRECTION]) -> Option<Lobe> {
+        if weight <= LEAST_WEIGHT {
+            return None;
+        }
+        let sum = DVec3::new(x, y, z);
+        let length = (sum.length() / weight).min(1.0);
+        let mean = kappa / weight;
+        let kappa = match self.filter {
+            Filter::Fixed => self.constant,
+            // Toksvig's factor |N| / (|N| + s (1 - |N|)) on the exponent s.
+            Filter::Toksvig | Filter::ToksvigLobe => mean * length / (length + mean * (1.0 - length)).max(f64::MIN_POSITIVE),
+            _ => mean,
+        };
+        Some(Lobe { mu: sum.try_normalize().unwrap_or(DVec3::Z), kappa, weight })
+    }
+
+    /// The lobes of cells, all of them or the two halves of one of four: as one cell's lobe, divided, or between the two.
+    fn divide(&self, cells: &[Cell], depth: usize, share: f64, lobes: &mut Vec<Lobe>) {
+        let whole = cells.iter().fold(Cell([0.0; CELL]), |sum, cell| sum.plus(cell));
+        let kept = if depth == PRINTED_LENGTHS.len() { 1.0 } else { self.kept(&whole, depth) };
+        if kept > 0.0 {
+            lobes.extend(whole.lobe(self.literal, share * kept));
+        }
+        if kept < 1.0 {
+            for part in cells.chunks(if depth == 0 { 2 } else { 1 }) {
+                self.divide(part, depth + 1, share * (1.0 - kept), lobes);
+            }
+        }
+    }
+
+    /// How much of a cell's one lobe stays beside those of its parts: by how far its spread goes beyond that of its lobes, or
+    /// all or none by the length of its mean vector.
+    fn kept(&self, cell: &Cell, depth: usize) -> f64 {
+        if self.literal {
+            return f64::from(u8::from(1.0 - cell.spread() >= PRINTED_LENGTHS[depth]));
+        }
+        let ratio = cell.spread() / (SPREAD_RATIO * cell.base_spread());
+        let t = ((1.25 - ratio) / 0.5).clamp(0.0, 1.0);
+        t * t * (3.0 - 2.0 * t)
+    }
+
+    /// The lobes of texel `i` of a level; none where there is no such texel.
+    pub fn mixture(&self, level: usize, i: usize) -> Mixture {
+        self.decode(&self.texel(level, i).unwrap_or_default())
+    }
+
+    /// Where in a texel of `vmf*` the cells are that make cell `cell` of a coarser partition.
+    pub fn cells_of(&self, coarser: Cells, cell: usize) -> Option<Range<usize>> {
+        let Storage::Cells(own) = self.filter.storage() else { return None };
+        let each = own.count() / coarser.count();
+        (each > 0 && cell < coarser.count()).then(|| cell * each * CELL..(cell + 1) * each * CELL)
+    }
+}
+
+/// Lobes of less weight are none.
+const LEAST_WEIGHT: f64 = 1e-12;
+
+fn encode(storage: Storage, lobes: &[Lobe], literal: bool, out: &mut [f64]) {
+    out.fill(0.0);
+    let (_, stride) = storage.layout(lobes.len());
+    for (i, lobe) in lobes.iter().enumerate() {
+        let at = storage.slot(i, lobe) * stride;
+        out[at..at + stride].iter_mut().zip(storage.encode(lobe, literal)).for_each(|(sum, c)| *sum += c);
+    }
+}
+
+fn gaussian([x, y, xx, xy, yy, weight]: [f64; SLOPE]) -> Option<slope::Lobe> {
+    let moments = [xx, xy, yy].map(|m| m / weight);
+    (weight > LEAST_WEIGHT).then(|| slope::Lobe::from_moments(DVec2::new(x, y) / weight, moments, weight))
+}
+
+/// A stored cell.
+#[derive(Clone, Copy)]
+struct Cell([f64; CELL]);
+
+impl Cell {
+    fn plus(self, other: &Self) -> Self {
+        Self(std::array::from_fn(|i| self.0[i] + other.0[i]))
+    }
+
+    fn sum(&self) -> DVec3 {
+        DVec3::new(self.0[0], self.0[1], self.0[2])
+    }
+
+    fn weight(&self) -> f64 {
+        self.0[3]
+    }
+
+    /// Of its mean vector.
+    fn spread(&self) -> f64 {
+        (1.0 - self.sum().length() / self.weight().max(LEAST_WEIGHT)).max(LEAST_SPREAD)
+    }
+
+    /// The mean of its lobes' own.
+    fn base_spread(&self) -> f64 {
+        (1.0 - self.0[4] / self.weight().max(LEAST_WEIGHT)).max(LEAST_SPREAD)
+    }
+
+    fn lobe(&self, literal: bool, share: f64) -> Option<Lobe> {
+        let kappa = if literal { literal::concentration(self.spread()) } else { vmf::concentration(self.spread()) };
+        let mu = self.sum().try_normalize().unwrap_or(DVec3::Z);
+        (self.weight() > LEAST_WEIGHT).then(|| Lobe { mu, kappa, weight: share * self.weight() })
+    }
+}

@@ -1,0 +1,20 @@
+//! What a texel of a mip holds: the distribution of microfacet normals under it, in f64. Nothing of Vulkan.
+//!
+//! **Conventions.** Directions lie in the surface's tangent frame, z along its normal. A lobe's `density` is over solid angle
+//! and integrates to its weight; the weights of a texel sum to 1. What a texel stores is linear in its children and
+//! multiplied by the lobe's weight, so that averages, and the hardware's own filters, are exact; it is decoded once, after them.
+
+pub mod brdf_map;
+pub mod effective;
+pub mod filter;
+pub mod literal;
+pub mod mip;
+pub mod mixture;
+pub mod partition;
+pub mod slope;
+pub mod vmf;
+
+pub use brdf_map::BrdfMap;
+pub use filter::{Filter, Filtered};
+pub use mixture::Mixture;
+pub use partition::Cells;
