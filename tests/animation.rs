@@ -191,7 +191,7 @@ fn a_frame_is_the_same_alone_and_among_others_and_a_plain_render_is_the_first() 
     }
     // What follows the frame before does so whether frames are timed or not.
     let mut world = load(MOVING).unwrap();
-    let luminance = settings(passband::Rate::Luminance.into());
+    let luminance = settings(rates::Rate::Own(passband::Rate::Luminance));
     let (plain, _) = frames(&mut world, &luminance, 1..4);
     let (timed, _) = frames(&mut world, &Settings { timed: true, ..luminance }, 1..4);
     assert!(plain.iter().zip(&timed).all(|(a, b)| a.channels == b.channels));
