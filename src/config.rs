@@ -15,6 +15,9 @@ pub enum Estimator {
     Brdf,
     /// Reflectance importance sampling with independent random points (Bagher 2011, section 3.3).
     BrdfRandom,
+    /// None: the environment is convolved beforehand with lobes by concentration, and each sample looks it up under the lobes of
+    /// its material. Free of noise, at [`Rate::Full`] only, for GGX, Blinn-Phong and vMF, with points and directions as lights.
+    Preconvolved,
     /// No estimate: reflectance and radiance looked up in hashed directions and summed. Its time is the least that any
     /// estimator with as many directions can take on a device.
     Lookup,
@@ -170,6 +173,8 @@ impl Config {
             "at most 16384 samples a side where samples are not all shaded",
             most.to_string(),
         )?;
+        let looked_up = self.estimator == Estimator::Preconvolved;
+        check(!looked_up || self.rate == Rate::Full, "rate", "Full, as the estimator is Preconvolved", format!("{:?}", self.rate))?;
         check((1..=64).contains(&self.probes), "probes", "1 to 64", self.probes.to_string())?;
         let rate = self.samples_per_cycle.unwrap_or(1.0);
         check(rate > 0.0 && rate.is_finite(), "samples_per_cycle", "a finite number > 0", rate.to_string())?;

@@ -1,6 +1,7 @@
 #![doc = include_str!("../README.md")]
 
 pub mod config;
+pub mod distribution;
 pub mod error;
 mod frame;
 pub mod frequency;

@@ -188,6 +188,7 @@ pub(crate) fn statistics(
         Estimator::Mis => "mis",
         Estimator::Brdf => "brdf",
         Estimator::BrdfRandom => "brdf-random",
+        Estimator::Preconvolved => "preconvolved",
         Estimator::Lookup => "lookup",
     };
     let values = BTreeMap::from([

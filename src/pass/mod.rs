@@ -2,6 +2,7 @@
 //! pass, `new`, `record`.
 
 pub mod bandwidth;
+pub mod base;
 pub mod classify;
 pub mod curvature;
 pub mod environment;
@@ -14,6 +15,7 @@ pub mod materials;
 pub mod modules;
 #[cfg(feature = "offline")]
 pub(crate) mod probe;
+pub mod prefilter;
 pub mod pyramid;
 pub mod resolve;
 pub mod shade;
@@ -50,8 +52,9 @@ pub(crate) struct PassContext<'a, 'b> {
 pub fn interfaces() -> Vec<Interface> {
     let mut all = vec![filter::INTERFACE, curvature::INTERFACE, bandwidth::INTERFACE, pyramid::INTERFACE];
     all.extend(classify::INTERFACES);
-    all.extend([shade::INTERFACE, upsample::INTERFACE, resolve::INTERFACE]);
+    all.extend([base::INTERFACE, shade::INTERFACE, upsample::INTERFACE, resolve::INTERFACE]);
     all.extend(tonemap::INTERFACES);
     all.extend(environment_bandwidth::INTERFACES);
+    all.extend(prefilter::INTERFACES);
     all
 }

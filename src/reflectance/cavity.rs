@@ -6,7 +6,7 @@ use glam::DVec3;
 
 /// G / (4 cos cos) with `G = min(1, 2 (n.h)(n.o) / (o.h), 2 (n.h)(n.i) / (o.h))` for directions above the horizon and their
 /// unit half vector; finite for each pair.
-pub(super) fn masking(wi: DVec3, wo: DVec3, h: DVec3) -> f64 {
+pub(crate) fn masking(wi: DVec3, wo: DVec3, h: DVec3) -> f64 {
     let open = 1.0 / (4.0 * wi.z * wo.z);
     let masked = h.z / (2.0 * wo.dot(h) * wi.z.max(wo.z));
     open.min(masked)

@@ -12,7 +12,7 @@ pub(crate) mod atlas;
 pub mod bake;
 pub mod bandwidth;
 pub mod blinn_phong;
-mod cavity;
+pub(crate) mod cavity;
 pub mod frame;
 pub mod ggx;
 pub mod half_row;

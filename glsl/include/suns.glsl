@@ -1,0 +1,21 @@
+// The suns of an environment as src/pass/prefilter.rs packs them (src/distribution/suns.rs says what they are).
+#ifndef SUNS_GLSL
+#define SUNS_GLSL
+
+struct SunRecord {
+    vec4 place;      // map coordinates
+    vec4 irradiance; // at normal incidence
+    ivec4 texels;    // first column, columns after it, first and last row
+};
+
+const uint MAX_SUNS = 8u;
+
+struct SunList {
+    vec2 scale;   // 1 / concentration of the chain's level 1; 1 / levels of concentration from there to the map
+    float bright; // largest channel of texels that are no sun's
+    float kept;   // largest channel of a sun's texel in what is left of the map
+    ivec4 count;  // x
+    SunRecord all[MAX_SUNS];
+};
+
+#endif
