@@ -174,7 +174,12 @@ impl Config {
             most.to_string(),
         )?;
         let looked_up = self.estimator == Estimator::Preconvolved;
-        check(!looked_up || self.rate == Rate::Full, "rate", "Full, as the estimator is Preconvolved", format!("{:?}", self.rate))?;
+        check(
+            !looked_up || self.rate == Rate::Full,
+            "rate",
+            "Full, as the estimator is Preconvolved",
+            format!("{:?}", self.rate),
+        )?;
         check((1..=64).contains(&self.probes), "probes", "1 to 64", self.probes.to_string())?;
         let rate = self.samples_per_cycle.unwrap_or(1.0);
         check(rate > 0.0 && rate.is_finite(), "samples_per_cycle", "a finite number > 0", rate.to_string())?;

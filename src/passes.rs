@@ -6,7 +6,8 @@ use crate::gpu::pipeline::BridgeLayouts;
 use crate::gpu::retire::{Build, Retired};
 use crate::pass::gbuffer::GBuffer;
 use crate::pass::{
-    PassContext, bandwidth, base, classify, curvature, environment_bandwidth, prefilter, pyramid, resolve, shade, tonemap, upsample,
+    PassContext, bandwidth, base, classify, curvature, environment_bandwidth, prefilter, pyramid, resolve, shade, tonemap,
+    upsample,
 };
 use ash::vk;
 

@@ -1,14 +1,15 @@
 // The environment under von Mises-Fisher lobes, by concentration, without its suns; irradiance; the suns. Rotation costs nothing.
-// src/distribution/prefilter.rs and suns.rs are the f64 twins. The includer defines PREFILTER_BINDING, the first of three.
+// src/distribution/prefilter.rs and suns.rs are the f64 twins. The includer defines PREFILTER_BINDING, the first of four.
 #ifndef PREFILTER_GLSL
 #define PREFILTER_GLSL
 #include "frame.glsl"
 #include "latlong.glsl"
 #include "suns.glsl"
 
-layout(set = 2, binding = PREFILTER_BINDING) uniform sampler2D prefilter_chain;          // level 0 the map, x4 less concentrated a level
-layout(set = 2, binding = PREFILTER_BINDING + 1) uniform sampler2D prefilter_irradiance;
-layout(set = 2, binding = PREFILTER_BINDING + 2, std430) readonly buffer PrefilterSuns {
+layout(set = 2, binding = PREFILTER_BINDING) uniform sampler2D prefilter_first;      // level 0 the map, then x4 less a level
+layout(set = 2, binding = PREFILTER_BINDING + 1) uniform sampler2D prefilter_second; // twice the first's next level
+layout(set = 2, binding = PREFILTER_BINDING + 2) uniform sampler2D prefilter_irradiance;
+layout(set = 2, binding = PREFILTER_BINDING + 3, std430) readonly buffer PrefilterSuns {
     SunList suns;
 } prefilter;
 
@@ -20,9 +21,17 @@ vec2 prefilter_uv(vec3 w) {
 
 // Mean radiance under a lobe of concentration kappa about world direction w.
 vec3 prefiltered(vec3 w, float kappa) {
-    float finer = 0.5 * log2(kappa * prefilter.suns.scale.x);
-    float level = finer <= 0.0 ? 1.0 - finer : max(1.0 - finer * prefilter.suns.scale.y, 0.0);
-    return textureLod(prefilter_chain, prefilter_uv(w), level).rgb * frame.environment.y;
+    // Steps of a factor of 2 down from the second's level 0; above it is the map.
+    float steps = min(-log2(kappa * prefilter.suns.scale.x), prefilter.suns.scale.y);
+    float first = floor(0.5 * steps) + 1.0, second = floor(0.5 * steps + 0.5);
+    float weight = 1.0 - abs(steps - (2.0 * first - 1.0));
+    bool map = steps < 0.0;
+    first = map ? 0.0 : first;
+    second = map ? 0.0 : min(second, first);
+    weight = map ? min(-steps * prefilter.suns.scale.z, 1.0) : weight;
+    vec2 uv = prefilter_uv(w);
+    vec3 a = textureLod(prefilter_first, uv, first).rgb, b = textureLod(prefilter_second, uv, second).rgb;
+    return mix(b, a, weight) * frame.environment.y;
 }
 
 // On a surface with world normal n.

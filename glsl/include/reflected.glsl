@@ -1,5 +1,5 @@
-// What pre-convolved light is looked up with: a material seen from one direction as lobes of light directions, and its diffuse part.
-// src/distribution/reflected.rs is the f64 twin. Include after materials.glsl.
+// What pre-convolved light is looked up with: a material seen from one direction as lobes of light directions, and its diffuse
+// part. src/distribution/reflected.rs is the f64 twin. Include after materials.glsl.
 #ifndef REFLECTED_GLSL
 #define REFLECTED_GLSL
 #include "vmf.glsl"

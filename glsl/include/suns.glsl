@@ -11,9 +11,8 @@ struct SunRecord {
 const uint MAX_SUNS = 8u;
 
 struct SunList {
-    vec2 scale;   // 1 / concentration of the chain's level 1; 1 / levels of concentration from there to the map
-    float bright; // largest channel of texels that are no sun's
-    float kept;   // largest channel of a sun's texel in what is left of the map
+    vec4 scale;   // 1 / the largest concentration of a lobe; factors of 2 from there to the least; 1 / those from the map to there
+    vec4 rule;    // largest channel of texels that are no sun's; that of a sun's texel in what is left of the map
     ivec4 count;  // x
     SunRecord all[MAX_SUNS];
 };

@@ -21,7 +21,7 @@ layout(push_constant) uniform Push {
 vec3 light(ivec2 p) {
     vec3 texel = texelFetch(environment, p, 0).rgb;
     float largest = max(max(texel.r, texel.g), texel.b);
-    if (largest > suns.bright) {
+    if (largest > suns.rule.x) {
         int columns = textureSize(environment, 0).x;
         bool sun = false;
         for (int i = 0; i < suns.count.x; ++i) {
@@ -30,7 +30,7 @@ vec3 light(ivec2 p) {
             x += x < 0 ? columns : 0;
             sun = sun || x <= at.y && p.y >= at.z && p.y <= at.w;
         }
-        texel *= sun ? suns.kept / largest : 1.0;
+        texel *= sun ? suns.rule.y / largest : 1.0;
     }
     return texel;
 }

@@ -1,26 +1,29 @@
 //! An environment under von Mises-Fisher lobes: the chain of maps that holds it by concentration, and what it holds, by dense
 //! quadrature. Twin of `glsl/include/prefilter.glsl` and `glsl/prefilter`.
 //!
-//! The chain is one lat-long image with mips. Level 0 is the environment itself without its suns ([`crate::distribution::suns`]); level
-//! l above is its convolution with a lobe whose standard deviation is a fixed number of that level's texels, so that the
-//! concentration falls by 4 a level and trilinear look-ups run through all. Rows go on beyond the poles by a tenth of the image
-//! each: the rows there are those of the meridian across, and bilinear look-ups need no case of their own.
+//! The chain is two lat-long images with mips. Level 0 of the first is the environment itself without its suns
+//! ([`crate::distribution::suns`]); level l above is its convolution with a lobe whose standard deviation is a fixed number of
+//! that level's texels, so that the concentration falls by 4 a level. The second image begins with the size of the first's level
+//! 1 and holds twice the concentration in each level: a look-up lies between a level of one and a level of the other, a factor of
+//! 2 apart. (One image with a factor of 4 is off by several times as much half-way between its levels.) Rows go on beyond the
+//! poles by a tenth of the image each: the rows there are those of the meridian across, and bilinear look-ups need no case of
+//! their own.
 
 use crate::sampling::LatLong;
 use glam::{DVec2, DVec3};
 use std::f64::consts::{PI, TAU};
 
-/// Square of a lobe's standard deviation in texels at the equator.
-pub const VARIANCE_IN_TEXELS: f64 = 2.0;
+/// Square of a lobe's standard deviation in texels at the equator, in the first image; half of it in the second.
+pub const VARIANCE_IN_TEXELS: f64 = 4.0;
 /// Columns of the coarsest level.
 pub const LEAST_WIDTH: u32 = 8;
 /// Columns of the finest: larger environments are averaged to it.
 pub const MOST_WIDTH: u32 = 2048;
 /// Columns of the least chain, of whose light all coarse levels are made.
 pub const SOURCE_WIDTH: u32 = 64;
-/// Levels of concentration (in factors of 4) between the finest lobe and the map itself, whose bilinear look-ups are lobes of a
+/// Factors of 2 between the concentration of the finest lobe and that of the map itself, whose bilinear look-ups are lobes of a
 /// variance of a quarter of a texel.
-pub const LEVELS_TO_MAP: f64 = 2.5;
+pub const STEPS_TO_MAP: f64 = 5.0;
 
 /// Shape of a chain.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -52,17 +55,21 @@ impl Chain {
         f64::from(self.width >> level) / 16.0
     }
 
-    /// Concentration of the lobes of level 1 (of `level` in general, except 0).
+    /// Concentration of the lobes of `level` of the first image, from level 1 on; level l - 1 of the second has twice as much.
     pub fn kappa(self, level: u32) -> f64 {
         let texel = TAU / f64::from(self.width >> level);
         1.0 / (VARIANCE_IN_TEXELS * texel * texel)
     }
 
-    /// The level to look up for a concentration.
-    pub fn level_of(self, kappa: f64) -> f64 {
-        let finer = 0.5 * (kappa / self.kappa(1)).log2();
-        let level = if finer <= 0.0 { 1.0 - finer } else { (1.0 - finer / LEVELS_TO_MAP).max(0.0) };
-        level.min(f64::from(self.levels() - 1))
+    /// What a look-up of concentration `kappa` reads: the level of the first image, that of the second, the first's weight.
+    pub fn levels_of(self, kappa: f64) -> (u32, u32, f64) {
+        // Steps down from the second image's level 0.
+        let steps = (2.0 * self.kappa(1) / kappa).log2().min(f64::from(2 * self.levels() - 3));
+        if steps < 0.0 {
+            return (0, 0, (-steps / STEPS_TO_MAP).min(1.0));
+        }
+        let (first, second) = ((steps / 2.0).floor() + 1.0, ((steps + 1.0) / 2.0).floor());
+        (first as u32, second.min(f64::from(self.levels() - 2)) as u32, 1.0 - (steps - (2.0 * first - 1.0)).abs())
     }
 }
 
@@ -81,7 +88,8 @@ pub fn irradiance(map: &LatLong, n: DVec3, refine: u32) -> DVec3 {
 /// Mean of `map` with a weight of the cosine to `towards`.
 fn weighted(map: &LatLong, towards: DVec3, refine: u32, weight: impl Fn(f64) -> f64) -> DVec3 {
     let size = [map.width() * refine, map.height() * refine];
-    let columns: Vec<_> = (0..size[0]).map(|x| ((f64::from(x) + 0.5) / f64::from(size[0]) - 0.5) * TAU).map(f64::sin_cos).collect();
+    let columns: Vec<_> =
+        (0..size[0]).map(|x| ((f64::from(x) + 0.5) / f64::from(size[0]) - 0.5) * TAU).map(f64::sin_cos).collect();
     let (mut sum, mut total) = (DVec3::ZERO, 0.0);
     for y in 0..size[1] {
         let v = (f64::from(y) + 0.5) / f64::from(size[1]);
@@ -116,15 +124,18 @@ mod tests {
             assert!(chain.width.is_power_of_two() && (64..=2048).contains(&chain.width), "{size:?}");
             assert!(chain.width >= size[0].min(2048) && chain.width >= (2 * size[1]).min(2048));
             for level in 1..chain.levels() {
-                assert_eq!(chain.level_of(chain.kappa(level)), f64::from(level));
+                let (first, _, weight) = chain.levels_of(chain.kappa(level));
+                assert!(first == level && (weight - 1.0).abs() < 1e-9, "{size:?} {level}");
+                let (_, second, weight) = chain.levels_of(2.0 * chain.kappa(level));
+                assert!(second == level - 1 && weight.abs() < 1e-9, "{size:?} {level}");
                 assert_eq!(chain.extent(level).map(|e| e << level), chain.extent(0), "{size:?} {level}");
             }
             assert_eq!(chain.extent(chain.levels() - 1), [8, 5]);
-            assert_eq!(chain.level_of(0.0), f64::from(chain.levels() - 1));
-            assert_eq!(chain.level_of(f64::INFINITY), 0.0);
+            assert_eq!(chain.levels_of(0.0), (chain.levels() - 1, chain.levels() - 2, 1.0));
+            assert_eq!(chain.levels_of(f64::INFINITY), (0, 0, 1.0));
         }
         let chain = Chain::of([1024, 512]);
-        assert!((chain.kappa(chain.levels() - 1) - 0.8).abs() < 0.1 && chain.kappa(1) > 3000.0);
+        assert!((chain.kappa(chain.levels() - 1) - 0.4).abs() < 0.1 && chain.kappa(1) > 1500.0);
     }
 
     /// A cosine about an axis is an eigenfunction: a lobe scales it by its mean cosine.

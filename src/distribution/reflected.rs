@@ -1,4 +1,5 @@
-//! What pre-convolved light is looked up with: a reflectance seen from one direction as von Mises-Fisher lobes of light directions.
+//! What pre-convolved light is looked up with: a reflectance seen from one direction as von Mises-Fisher lobes of light
+//! directions.
 //! Twin of `glsl/include/reflected.glsl`.
 //!
 //! A lobe of half vectors about m of concentration k is one of light directions about reflect(-o, m) of concentration k / 4|o.m|
@@ -21,8 +22,8 @@ pub struct ReflectedLobe {
     pub weight: DVec3,
 }
 
-/// Lobes and diffuse reflectance (a factor on irradiance, in 1/sr) of a model seen from `wo` (unit, above the horizon, in the frame
-/// that the model is evaluated in). `None` for tables, which have no lobes of their own.
+/// Lobes and diffuse reflectance (a factor on irradiance, in 1/sr) of a model seen from `wo` (unit, above the horizon, in the
+/// frame that the model is evaluated in). `None` for tables, which have no lobes of their own.
 pub fn reflected(model: &Model, wo: DVec3) -> Option<(Vec<ReflectedLobe>, DVec3)> {
     Some(match model {
         Model::Table(_) | Model::Turned(_) => return None,
@@ -42,15 +43,15 @@ pub fn reflected(model: &Model, wo: DVec3) -> Option<(Vec<ReflectedLobe>, DVec3)
         }
         Model::Vmf(vmf) => {
             let lobes = vmf.lobes().iter().zip(vmf.peaks());
-            let reflected = lobes
-                .filter_map(|(l, &peak)| lobe(wo, l.mu, l.kappa, peak, |wi| DVec3::splat(cavity::masking(wi, wo, l.mu))));
+            let reflected =
+                lobes.filter_map(|(l, &peak)| lobe(wo, l.mu, l.kappa, peak, |wi| DVec3::splat(cavity::masking(wi, wo, l.mu))));
             (reflected.collect(), DVec3::ZERO)
         }
     })
 }
 
-/// The lobe of half vectors about `m` whose density at the centre is `peak`; `value` is the BRDF there over that density. None where
-/// its centre is seen from behind or reflects below the horizon.
+/// The lobe of half vectors about `m` whose density at the centre is `peak`; `value` is the BRDF there over that density. None
+/// where its centre is seen from behind or reflects below the horizon.
 fn lobe(wo: DVec3, m: DVec3, kappa: f64, peak: f64, value: impl Fn(DVec3) -> DVec3) -> Option<ReflectedLobe> {
     let cosine = wo.dot(m);
     let direction = m * (2.0 * cosine) - wo;

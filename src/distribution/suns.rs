@@ -1,5 +1,5 @@
-//! Suns: the few small spots of an environment that outshine the rest of it, taken out of the map and kept as directional lights.
-//! What is left has no spike for a look-up to smear, and a sun shows the reflectance itself and not its approximation.
+//! Suns: the few small spots of an environment that outshine the rest of it, taken out of the map and kept as directional
+//! lights. What is left has no spike for a look-up to smear, and a sun shows the reflectance itself and not its approximation.
 
 use crate::sampling::latlong::direction;
 use crate::sampling::{LatLong, luminance};
@@ -144,9 +144,13 @@ impl Suns {
     /// `map` without them.
     pub fn removed(&self, map: &LatLong) -> LatLong {
         let mut rest = map.clone();
-        for (sun, at) in self.suns.iter().map(|s| s.texels).enumerate().flat_map(|(i, [x0, x1, y0, y1])| {
-            (y0..=y1).flat_map(move |y| (x0..=x1).map(move |x| (i, [x, y])))
-        }) {
+        for (sun, at) in self
+            .suns
+            .iter()
+            .map(|s| s.texels)
+            .enumerate()
+            .flat_map(|(i, [x0, x1, y0, y1])| (y0..=y1).flat_map(move |y| (x0..=x1).map(move |x| (i, [x, y]))))
+        {
             let at = [at[0].rem_euclid(map.width() as i32), at[1]];
             if self.sun_of(map, at) == Some(sun) {
                 let texel = map.texel(at[0].into(), at[1].into());
@@ -174,9 +178,8 @@ mod tests {
     fn map([width, height]: [u32; 2], spots: &[([i32; 2], i32)]) -> LatLong {
         let texel = |i: u32| {
             let [x, y] = [(i % width) as i32, (i / width) as i32];
-            let inside = |&([sx, sy], side): &([i32; 2], i32)| {
-                (x - sx).rem_euclid(width as i32) < side && (sy..sy + side).contains(&y)
-            };
+            let inside =
+                |&([sx, sy], side): &([i32; 2], i32)| (x - sx).rem_euclid(width as i32) < side && (sy..sy + side).contains(&y);
             let dim = 0.5 + (i.wrapping_mul(2_654_435_761) >> 20) as f32 / 4096.0;
             if spots.iter().any(inside) { [3e4, 2e4, 1e4] } else { [dim; 3] }
         };
@@ -200,10 +203,13 @@ mod tests {
             assert!(error < 1e-7, "{size:?}: {error:e}");
             let (brightest, all) = (rest.texels().iter().copied().map(largest).fold(0.0, f32::max), map.texels().len());
             assert!(count != spots.len() || brightest <= suns.bright, "{brightest}");
-            assert_eq!(rest.texels().iter().zip(map.texels()).filter(|(a, b)| a == b).count(), all - match count {
-                2 if size[0] == 512 => 9 + 4,
-                n => n,
-            });
+            assert_eq!(
+                rest.texels().iter().zip(map.texels()).filter(|(a, b)| a == b).count(),
+                all - match count {
+                    2 if size[0] == 512 => 9 + 4,
+                    n => n,
+                }
+            );
         }
         let map = map([512, 256], &[([511, 100], 3)]);
         let sun = Suns::of(&map).suns[0];

@@ -4,8 +4,8 @@ use crate::Estimator;
 use crate::offline::error::Result;
 use crate::offline::session::Session;
 
-/// The samples that were shaded: x, y and the level over a sample of the cell that each stands for. Pre-convolved light shades all
-/// that are covered.
+/// The samples that were shaded: x, y and the level over a sample of the cell that each stands for. Pre-convolved light shades
+/// all that are covered.
 ///
 /// # Errors
 /// The device's, on read-back.

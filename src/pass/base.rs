@@ -36,6 +36,7 @@ pub const INTERFACE: Interface = Interface {
         D::STORAGE_IMAGE,
         D::COMBINED_IMAGE_SAMPLER,
         D::COMBINED_IMAGE_SAMPLER,
+        D::COMBINED_IMAGE_SAMPLER,
         D::STORAGE_BUFFER,
     ],
 };
@@ -95,14 +96,15 @@ impl Base {
         rec.image(io.factors, Access::COMPUTE_SAMPLED);
         rec.overwrite(io.radiance, Access::COMPUTE_WRITE);
         rec.flush();
-        let [chain, irradiance, suns] = io.prefiltered.resources(io.samplers);
+        let [first, second, irradiance, suns] = io.prefiltered.resources(io.samplers);
         let resources = [
             Resource::Uniform(io.frame),
             Resource::Sampled(io.normals, io.samplers.nearest),
             Resource::Sampled(io.factors, io.samplers.nearest),
             Resource::Buffer(io.lights),
             Resource::Storage(io.radiance.view),
-            chain,
+            first,
+            second,
             irradiance,
             suns,
         ];

@@ -13,9 +13,9 @@ pub(crate) mod level;
 pub(crate) mod maps;
 pub mod materials;
 pub mod modules;
+pub mod prefilter;
 #[cfg(feature = "offline")]
 pub(crate) mod probe;
-pub mod prefilter;
 pub mod pyramid;
 pub mod resolve;
 pub mod shade;

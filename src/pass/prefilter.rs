@@ -1,11 +1,11 @@
-//! Pass 0a, continued: the environment under lobes by concentration, its irradiance and its suns (Xu et al. 2017, section 4, looks
-//! them up; [`crate::distribution::prefilter`] and [`crate::distribution::suns`] are the f64 twins).
+//! Pass 0a, continued: the environment under lobes by concentration, its irradiance and its suns (Xu et al. 2017, section 4,
+//! looks them up; [`crate::distribution::prefilter`] and [`crate::distribution::suns`] are the f64 twins).
 //!
 //! Level 0 is the map without its suns. Of it come grids of nearly square texels, each a mean of the finer one's; every further
 //! level gathers the light under its lobe from the grid that is as fine as itself, and none from another level, so that no error
 //! adds up. All of it lies in one buffer, which is copied into an image with mips at the end.
 
-use crate::distribution::prefilter::{Chain, LEVELS_TO_MAP, SOURCE_WIDTH};
+use crate::distribution::prefilter::{Chain, SOURCE_WIDTH, STEPS_TO_MAP};
 use crate::distribution::suns::{MAX_SUNS, Suns};
 use crate::error::Result;
 use crate::gpu::access::Access;
@@ -67,9 +67,8 @@ struct ConvolvePush {
 #[repr(C)]
 #[derive(Clone, Copy, Pod, Zeroable)]
 struct SunList {
-    scale: [f32; 2],
-    bright: f32,
-    kept: f32,
+    scale: [f32; 4],
+    rule: [f32; 4],
     count: [i32; 4],
     all: [SunRecord; MAX_SUNS],
 }
@@ -86,9 +85,8 @@ impl SunList {
     fn of(map: &LatLong, chain: Chain) -> Self {
         let Suns { suns, bright, kept } = Suns::of(map);
         let mut list = Self {
-            scale: [(1.0 / chain.kappa(1)) as f32, (1.0 / LEVELS_TO_MAP) as f32],
-            bright,
-            kept,
+            scale: [(0.5 / chain.kappa(1)) as f32, (2 * chain.levels() - 3) as f32, (1.0 / STEPS_TO_MAP) as f32, 0.0],
+            rule: [bright, kept, 0.0, 0.0],
             count: [suns.len() as i32, 0, 0, 0],
             ..Self::zeroed()
         };
@@ -109,8 +107,8 @@ const TEXEL: u64 = 16;
 
 /// What the shaders look up (`glsl/include/prefilter.glsl`).
 pub(crate) struct Prefiltered {
-    /// RGBA32F with mips: light by concentration.
-    pub chain: Image,
+    /// RGBA32F with mips: light by concentration, in two images.
+    pub chain: [Image; 2],
     /// RGBA32F: irradiance.
     pub irradiance: Image,
     /// A `SunList`.
@@ -122,9 +120,10 @@ pub(crate) struct Work {
     chain: Chain,
     same_size: bool,
     refine: i32,
-    images: [Image; 2],
+    /// Both of the chain, irradiance.
+    images: [Image; 3],
     suns: BufferUpload,
-    /// Texels of all levels, then of the irradiance.
+    /// Texels of all levels of each, one after another.
     texels: Buffer,
     /// Grids of even and of odd levels.
     grids: [Buffer; 2],
@@ -149,6 +148,13 @@ pub(crate) struct Prefilter {
 /// Texels of the levels below `level`.
 fn texels_below(chain: Chain, level: u32) -> u64 {
     (0..level).map(|l| chain.extent(l).map(u64::from).iter().product::<u64>()).sum()
+}
+
+/// The first texel of both images of the chain and of the irradiance, and the number of all texels.
+fn starts(chain: Chain) -> [u64; 4] {
+    let second = texels_below(chain, chain.levels());
+    let irradiance = second + second - texels_below(chain, 1);
+    [0, second, irradiance, irradiance + texels_below(IRRADIANCE, 1)]
 }
 
 /// The finest level of [`SOURCE_WIDTH`] columns, the last of which there is a grid.
@@ -188,13 +194,14 @@ impl Prefilter {
         };
         let images = [
             make("environment prefiltered", chain.extent(0), chain.levels())?,
+            make("environment prefiltered 2", chain.extent(1), chain.levels() - 1)?,
             make("environment irradiance", IRRADIANCE.extent(0), 1)?,
         ];
         let storage = vk::BufferUsageFlags::STORAGE_BUFFER;
         let suns = BufferUpload::new(build, "suns", storage, bytemuck::bytes_of(&SunList::of(map, chain)))?;
         let mut buffer = |name, texels, usage| Buffer::new(build, name, texels * TEXEL, usage, Location::Device);
-        let all = texels_below(chain, chain.levels()) + texels_below(IRRADIANCE, 1);
-        let texels = buffer("prefiltered texels", all, storage | vk::BufferUsageFlags::TRANSFER_SRC)?;
+        let [.., end] = starts(chain);
+        let texels = buffer("prefiltered texels", end, storage | vk::BufferUsageFlags::TRANSFER_SRC)?;
         let last = grid_levels(chain);
         let even = buffer("even grids", grids_below(chain, (last / 2 + 1) * 2), storage)?;
         let odd = buffer("odd grids", grids_below(chain, last.div_ceil(2) * 2 + 1).max(1), storage)?;
@@ -209,7 +216,8 @@ impl Prefilter {
         for (set, from) in [&even, &odd].into_iter().enumerate() {
             write_set(device, sets[2].sets[set], &[Resource::Buffer(from), Resource::Buffer(&texels)]);
         }
-        let refine = size[0].div_ceil(chain.width).max(size[1].div_ceil(chain.width / 2)) as i32;
+        // Two points for each texel of the map that is finer, so that none is missed.
+        let refine = 2 * size[0].div_ceil(chain.width).max(size[1].div_ceil(chain.width / 2)) as i32;
         let same_size = size == [chain.width, chain.width / 2];
         Ok(Work { chain, same_size, refine, images, suns, texels, grids: [even, odd], sets })
     }
@@ -264,14 +272,19 @@ impl Prefilter {
             pipeline.bind_set(rec, sets[2].sets[source as usize % 2], &push);
             pipeline.dispatch(rec, [width, height]);
         };
-        (1..chain.levels()).for_each(|level| convolve(level, texels_below(chain, level), chain, Some(chain.kappa(level))));
-        let irradiance = texels_below(chain, chain.levels());
+        let [first, second, irradiance, _] = starts(chain);
+        for level in 1..chain.levels() {
+            let kappa = chain.kappa(level);
+            convolve(level, first + texels_below(chain, level), chain, Some(kappa));
+            let below = texels_below(chain, level) - texels_below(chain, 1);
+            convolve(level, second + below, chain, Some(2.0 * kappa));
+        }
         convolve(0, irradiance, IRRADIANCE, None);
 
         rec.buffer(&texels, Access::TRANSFER_READ);
         images.iter().for_each(|image| rec.overwrite(image, Access::TRANSFER_WRITE));
         rec.flush();
-        for (image, first) in images.iter().zip([0, irradiance]) {
+        for (image, first) in images.iter().zip([first, second, irradiance]) {
             copy(rec, &texels, first, image);
         }
         rec.end();
@@ -281,8 +294,8 @@ impl Prefilter {
             buffer.retire(bag);
         }
         sets.into_iter().for_each(|sets| sets.retire(bag));
-        let [chain, irradiance] = images;
-        Prefiltered { chain, irradiance, suns }
+        let [first, second, irradiance] = images;
+        Prefiltered { chain: [first, second], irradiance, suns }
     }
 
     pub fn retire(self, bag: &mut Retired) {
@@ -319,19 +332,19 @@ fn copy(rec: &Recorder<'_>, texels: &Buffer, first: u64, image: &Image) {
 impl Prefiltered {
     /// Declares all of it read by the pass that is open.
     pub fn sampled(&self, rec: &mut Recorder<'_>) {
-        rec.image(&self.chain, Access::COMPUTE_SAMPLED);
+        self.chain.iter().for_each(|image| rec.image(image, Access::COMPUTE_SAMPLED));
         rec.image(&self.irradiance, Access::COMPUTE_SAMPLED);
         rec.buffer(&self.suns, Access::COMPUTE_READ);
     }
 
-    /// For the three bindings of `glsl/include/prefilter.glsl`.
-    pub fn resources<'a>(&'a self, samplers: &Samplers) -> [Resource<'a>; 3] {
+    /// For the four bindings of `glsl/include/prefilter.glsl`.
+    pub fn resources<'a>(&'a self, samplers: &Samplers) -> [Resource<'a>; 4] {
         let image = |image| Resource::Sampled(image, samplers.tiled);
-        [image(&self.chain), image(&self.irradiance), Resource::Buffer(&self.suns)]
+        [image(&self.chain[0]), image(&self.chain[1]), image(&self.irradiance), Resource::Buffer(&self.suns)]
     }
 
     pub fn retire(self, states: &mut States, bag: &mut Retired) {
-        for image in [self.chain, self.irradiance] {
+        for image in self.chain.into_iter().chain([self.irradiance]) {
             states.forget(image.handle);
             image.retire(bag);
         }

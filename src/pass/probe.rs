@@ -32,6 +32,7 @@ pub const INTERFACE: Interface = Interface {
         D::STORAGE_BUFFER,
         D::COMBINED_IMAGE_SAMPLER,
         D::COMBINED_IMAGE_SAMPLER,
+        D::COMBINED_IMAGE_SAMPLER,
         D::STORAGE_BUFFER,
     ],
 };
@@ -67,10 +68,10 @@ impl Probe {
         rec.buffer(io.output, Access::COMPUTE_WRITE);
         rec.flush();
         // Without pre-convolved light others stand in, unread.
-        let none = [Resource::Sampled(&io.environment.map, io.samplers.linear); 2];
-        let [chain, irradiance, suns] = match &io.environment.prefiltered {
+        let map = Resource::Sampled(&io.environment.map, io.samplers.linear);
+        let [first, second, irradiance, suns] = match &io.environment.prefiltered {
             Some(prefiltered) => prefiltered.resources(io.samplers),
-            None => [none[0], none[1], Resource::Buffer(io.input)],
+            None => [map, map, map, Resource::Buffer(io.input)],
         };
         let resources = [
             Resource::Uniform(io.frame),
@@ -78,7 +79,8 @@ impl Probe {
             Resource::Sampled(&io.environment.alias, io.samplers.nearest),
             Resource::Buffer(io.input),
             Resource::Buffer(io.output),
-            chain,
+            first,
+            second,
             irradiance,
             suns,
         ];
