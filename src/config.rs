@@ -17,6 +17,9 @@ pub enum Estimator {
     Brdf,
     /// Reflectance importance sampling with independent random points (Bagher 2011, section 3.3).
     BrdfRandom,
+    /// None: the environment is convolved beforehand with lobes by concentration, and each sample looks it up under the lobes of
+    /// its material. Free of noise, at [`Rate::Full`] only, for GGX, Blinn-Phong and vMF, with points and directions as lights.
+    Preconvolved,
     /// No estimate: reflectance and radiance looked up in hashed directions and summed. Its time is the least that any
     /// estimator with as many directions can take on a device.
     Lookup,
@@ -179,6 +182,13 @@ impl Config {
             "extent",
             "at most 16384 samples a side where samples are not all shaded",
             most.to_string(),
+        )?;
+        let looked_up = self.estimator == Estimator::Preconvolved;
+        check(
+            !looked_up || self.rate == Rate::Full,
+            "rate",
+            "Full, as the estimator is Preconvolved",
+            format!("{:?}", self.rate),
         )?;
         check((1..=256).contains(&self.probes), "probes", "1 to 256", self.probes.to_string())?;
         check((1e-3..=0.1).contains(&self.eps), "eps", "0.001 to 0.1", self.eps.to_string())?;

@@ -1,11 +1,11 @@
 //! What a host hands over for one frame.
 
-use crate::config::{Config, Rate};
+use crate::config::{Config, Estimator, Rate};
 use crate::error::{Error, Result};
 use crate::gpu::access::ImageRef;
 use crate::light::{self, Light};
 use crate::pass::gbuffer::{self, Draw};
-use crate::pass::{FrameUniform, tonemap};
+use crate::pass::{FrameUniform, base, tonemap};
 use crate::plan::Plan;
 use crate::view::View;
 use ash::vk;
@@ -99,6 +99,9 @@ impl<'a> FrameInputs<'a> {
             return Err(Error::invalid("environment", "finite rotation and intensity >= 0", format!("{:?}", self.environment)));
         }
         light::check(self.lights)?;
+        if config.estimator == Estimator::Preconvolved {
+            base::check_lights(self.lights)?;
+        }
         match self.gbuffer {
             GBufferInput::Draws(draws) => gbuffer::check(draws)?,
             GBufferInput::Host { images, .. } => {

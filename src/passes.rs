@@ -1,28 +1,37 @@
 //! The frame's passes, created from a configuration: only those that it records.
 
-use crate::config::{Config, GBufferSource, Rate};
+use crate::config::{Config, Estimator, GBufferSource, Rate};
 use crate::error::Result;
 use crate::gpu::pipeline::BridgeLayouts;
 use crate::gpu::retire::{Build, Retired};
 use crate::pass::gbuffer::GBuffer;
 use crate::pass::{
-    PassContext, bandwidth, classify, curvature, environment_bandwidth, luminance, pyramid, resolve, shade, tonemap, upsample,
+    PassContext, bandwidth, base, classify, curvature, environment_bandwidth, luminance, prefilter, pyramid, resolve, shade,
+    tonemap, upsample,
 };
 use ash::vk;
 
 /// Passes of the frame.
 pub(crate) struct Passes {
     pub environment_bandwidth: Option<environment_bandwidth::EnvironmentBandwidth>,
+    pub prefilter: Option<prefilter::Prefilter>,
     pub gbuffer: Option<GBuffer>,
     pub curvature: Option<curvature::Curvature>,
     pub bandwidth: Option<bandwidth::Bandwidth>,
     pub luminance: Option<luminance::Luminance>,
     pub pyramid: Option<pyramid::Pyramid>,
-    pub classify: classify::Classify,
-    pub shade: shade::Shade,
+    /// Pre-convolved light, or else samples that are listed and shaded.
+    pub base: Option<base::Base>,
+    pub sampled: Option<Sampled>,
     pub upsample: Option<upsample::Upsample>,
     pub resolve: resolve::Resolve,
     pub tonemap: tonemap::Tonemap,
+}
+
+/// What draws directions.
+pub(crate) struct Sampled {
+    pub classify: classify::Classify,
+    pub shade: shade::Shade,
 }
 
 impl Passes {
@@ -35,17 +44,22 @@ impl Passes {
         };
         p.bridge.gbuffer = layout(&gbuffer, config);
         let (top, predicted) = (config.coarsest(), config.rate == Rate::Bandwidth);
+        let looked_up = config.estimator == Estimator::Preconvolved;
+        let sampled = |p: &mut PassContext<'_, '_>| -> Result<Sampled> {
+            Ok(Sampled { classify: classify::Classify::new(p, top, predicted)?, shade: shade::Shade::new(p, config, top > 0)? })
+        };
         Ok(Self {
             environment_bandwidth: predicted
                 .then(|| environment_bandwidth::EnvironmentBandwidth::new(&mut p, config.eps))
                 .transpose()?,
+            prefilter: looked_up.then(|| prefilter::Prefilter::new(&mut p)).transpose()?,
             gbuffer,
             curvature: config.curvature.then(|| curvature::Curvature::new(&mut p)).transpose()?,
             bandwidth: predicted.then(|| bandwidth::Bandwidth::new(&mut p, config)).transpose()?,
             luminance: (top > 0 && config.rate == Rate::Luminance).then(|| luminance::Luminance::new(&mut p)).transpose()?,
             pyramid: (top > 0).then(|| pyramid::Pyramid::new(&mut p, top)).transpose()?,
-            classify: classify::Classify::new(&mut p, top, predicted)?,
-            shade: shade::Shade::new(&mut p, config, top > 0)?,
+            base: looked_up.then(|| base::Base::new(&mut p, config)).transpose()?,
+            sampled: (!looked_up).then(|| sampled(&mut p)).transpose()?,
             upsample: (top > 0).then(|| upsample::Upsample::new(&mut p, top)).transpose()?,
             resolve: resolve::Resolve::new(&mut p)?,
             tonemap: tonemap::Tonemap::new(&mut p)?,
@@ -54,6 +68,9 @@ impl Passes {
 
     pub fn retire(self, bag: &mut Retired) {
         if let Some(pass) = self.environment_bandwidth {
+            pass.retire(bag);
+        }
+        if let Some(pass) = self.prefilter {
             pass.retire(bag);
         }
         if let Some(pass) = self.gbuffer {
@@ -71,8 +88,13 @@ impl Passes {
         if let Some(pass) = self.pyramid {
             pass.retire(bag);
         }
-        self.classify.retire(bag);
-        self.shade.retire(bag);
+        if let Some(pass) = self.base {
+            pass.retire(bag);
+        }
+        if let Some(Sampled { classify, shade }) = self.sampled {
+            classify.retire(bag);
+            shade.retire(bag);
+        }
         if let Some(pass) = self.upsample {
             pass.retire(bag);
         }

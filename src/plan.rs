@@ -197,7 +197,7 @@ impl Directions {
     /// Half of the configured number from the reflectance; the other half in equal parts from the environment, if it shines,
     /// and each of `area_lights`, at least one each.
     pub fn of(config: &Config, environment: bool, area_lights: u32) -> Self {
-        let n = config.directions;
+        let n = if config.estimator == crate::Estimator::Preconvolved { 0 } else { config.directions };
         let sources = u32::from(environment) + area_lights;
         if config.estimator != crate::Estimator::Mis || sources == 0 {
             return Self { brdf: n, environment: 0, light: 0 };

@@ -1,6 +1,6 @@
 //! The frame, readable top to bottom: which pass, in which order, on which images.
 
-use crate::config::{Config, Rate};
+use crate::config::{Config, Estimator, Rate};
 use crate::error::{Error, Result};
 use crate::frame::{FrameInputs, GBufferInput, Output};
 use crate::gpu::access::Access;
@@ -14,14 +14,14 @@ use crate::gpu::sampler::Samplers;
 use crate::gpu::timer::{FrameTimings, GpuTimer};
 use crate::light;
 use crate::material::Material;
-use crate::pass::environment::{EnvironmentImages, EnvironmentUpload};
+use crate::pass::environment::{Analyses, EnvironmentImages, EnvironmentUpload};
 use crate::pass::gbuffer;
 use crate::pass::materials::{MaterialBridge, MaterialImages, MaterialsUpload};
 use crate::pass::{
-    FrameUniform, PassContext, bandwidth, classify, curvature, filter, level, luminance, pyramid, resolve, shade, tonemap,
+    FrameUniform, PassContext, bandwidth, base, classify, curvature, filter, level, luminance, pyramid, resolve, shade, tonemap,
     upsample,
 };
-use crate::passes::{Passes, layout};
+use crate::passes::{Passes, Sampled, layout};
 use crate::plan::{Directions, LIGHT_BYTES};
 use crate::sampling::LatLong;
 use crate::targets::Targets;
@@ -121,11 +121,12 @@ impl Renderer {
         map: &LatLong,
         memory: &mut dyn HostAllocator,
     ) -> Result<Retired> {
-        let bandwidth = self.passes.environment_bandwidth.as_ref();
-        let upload = Build::run(&self.cx, memory, |build| EnvironmentUpload::new(build, map, bandwidth, &self.samplers))?;
+        let passes =
+            Analyses { bandwidth: self.passes.environment_bandwidth.as_ref(), prefilter: self.passes.prefilter.as_ref() };
+        let upload = Build::run(&self.cx, memory, |build| EnvironmentUpload::new(build, map, passes, &self.samplers))?;
         let mut bag = Retired::default();
         let mut rec = Recorder::new(&self.cx, cmd, 0, &mut self.states, None);
-        let fresh = upload.record(&mut rec, bandwidth, &mut bag);
+        let fresh = upload.record(&mut rec, passes, &mut bag);
         if let Some(former) = self.environment.replace(fresh) {
             former.retire(&mut self.states, &mut bag);
         }
@@ -149,6 +150,9 @@ impl Renderer {
         let bridge = BridgeLayouts { gbuffer: layout(&self.passes.gbuffer, &self.config), materials: self.bridge.layout };
         let (modules, slots, widened) = (&self.config.modules, self.config.frames_in_flight, self.config.widened());
         let eps = (self.config.rate == Rate::Bandwidth).then_some(self.config.eps);
+        if self.config.estimator == Estimator::Preconvolved {
+            base::check_materials(materials)?;
+        }
         let (upload, filter) = Build::run(&self.cx, memory, |build| {
             let upload = MaterialsUpload::new(build, materials, widened, eps)?;
             let filter = filter::Filter::new(&mut PassContext { build, modules, bridge, slots }, upload.uses(), widened)?;
@@ -290,32 +294,42 @@ impl Renderer {
             from = classify::From::Cells(cells, &buffers.weights, forecast.map(|f| (f, bandwidth::OF_SAMPLES)));
         }
 
-        // 6  Which samples to shade.
-        let (arguments, list) = (&targets.arguments, &targets.list);
-        passes.classify.record(rec, &classify::Io { frame, bridge, from, arguments, list });
-
-        // 8  Their radiance.
         let radiance = &targets.radiance;
-        let directions = Directions::of(&self.config, inputs.environment.intensity > 0.0, area);
-        passes.shade.record(
-            rec,
-            &shade::Io {
-                frame,
-                bridge,
-                samplers,
-                normals,
-                factors,
-                environment,
-                materials,
-                arguments,
-                list,
-                lights,
-                light_count: exact + area,
-                directions,
-                radiance,
-                odd: targets.odd.as_ref(),
-            },
-        );
+        if let Some(Sampled { classify, shade }) = &passes.sampled {
+            // 6  Which samples to shade.
+            let (arguments, list) = (&targets.arguments, &targets.list);
+            classify.record(rec, &classify::Io { frame, bridge, from, arguments, list });
+
+            // 8  Their radiance.
+            let directions = Directions::of(&self.config, inputs.environment.intensity > 0.0, area);
+            shade.record(
+                rec,
+                &shade::Io {
+                    frame,
+                    bridge,
+                    samplers,
+                    normals,
+                    factors,
+                    environment,
+                    materials,
+                    arguments,
+                    list,
+                    lights,
+                    light_count: exact + area,
+                    directions,
+                    radiance,
+                    odd: targets.odd.as_ref(),
+                },
+            );
+        }
+        // 7  Or the radiance of all, from pre-convolved light.
+        if let (Some(pass), Some(prefiltered)) = (&passes.base, &environment.prefiltered) {
+            let light_count = exact + area;
+            pass.record(
+                rec,
+                &base::Io { frame, bridge, samplers, normals, factors, prefiltered, materials, lights, light_count, radiance },
+            );
+        }
         if let (Some(pass), Some(buffers), Some(odd)) = (&passes.upsample, &targets.cells, &targets.odd) {
             let (cells, weights, values) = (buffers.cells(), &buffers.weights, [radiance, odd]);
             pass.record(rec, &upsample::Io { frame, samplers, cells, weights, values });

@@ -80,7 +80,7 @@ fn every_documented_flag_works_or_is_not_supported_yet() {
     let folder = Folder::new("flags");
     let filters = "point naive fixed toksvig toksvig-lobe lean lean-lobe leadr tk fournier4 fournier7 gmm gmm-unaligned vmf1 vmf4 \
                    vmf8 vmf clusters bruteforce supersample";
-    let layers = "level weight samples bandwidth spread shaded lobes mip depth normal material curvature uv";
+    let layers = "level weight samples bandwidth spread shaded lobes mip depth normal material curvature uv base";
     let choices = [
         ("--rate", "full half quarter luminance bandwidth oracle"),
         ("--estimator", "mis brdf brdf-random preconvolved cv residual"),
@@ -103,8 +103,12 @@ fn every_documented_flag_works_or_is_not_supported_yet() {
         for value in values.split_whitespace() {
             // What the prediction finds is there where there is one.
             let predicted = ["bandwidth", "spread"].contains(&value) && flag == "--aov";
-            let rate: &[&str] = if predicted { &["--rate", "bandwidth"] } else { &[] };
-            let run = folder.render("furnace", &[&[flag, value, "-o", "out.exr"], rate].concat());
+            let beside: &[&str] = match value {
+                _ if predicted => &["--rate", "bandwidth"],
+                "base" => &["--estimator", "preconvolved"],
+                _ => &[],
+            };
+            let run = folder.render("furnace", &[&[flag, value, "-o", "out.exr"], beside].concat());
             if run.code == 0 {
                 run.quiet();
                 worked.push(format!("{flag} {value}"));

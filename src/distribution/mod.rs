@@ -1,4 +1,5 @@
-//! What a texel of a mip holds: the distribution of microfacet normals under it, in f64. Nothing of Vulkan.
+//! What a texel of a mip holds, the distribution of microfacet normals under it, and light convolved with its lobes, in f64.
+//! Nothing of Vulkan.
 //!
 //! **Conventions.** Directions lie in the surface's tangent frame, z along its normal. A lobe's `density` is over solid angle
 //! and integrates to its weight; the weights of a texel sum to 1. What a texel stores is linear in its children and
@@ -11,7 +12,10 @@ pub mod literal;
 pub mod mip;
 pub mod mixture;
 pub mod partition;
+pub mod prefilter;
+pub mod reflected;
 pub mod slope;
+pub mod suns;
 pub mod vmf;
 
 pub use brdf_map::BrdfMap;

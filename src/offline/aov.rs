@@ -1,5 +1,6 @@
 //! Layers beside radiance: what the frame's own images hold, at one shading sample an output pixel.
 
+use crate::Estimator;
 use crate::offline::error::{Error, Result};
 use crate::offline::levels;
 use crate::offline::session::Session;
@@ -33,9 +34,11 @@ pub enum Aov {
     Shaded,
     /// Directions drawn for the sample.
     Samples,
+    /// Radiance from pre-convolved light.
+    Base,
 }
 
-const ALL: [(&str, Aov); 13] = [
+const ALL: [(&str, Aov); 14] = [
     ("depth", Aov::Depth),
     ("normal", Aov::Normal),
     ("material", Aov::Material),
@@ -49,6 +52,7 @@ const ALL: [(&str, Aov); 13] = [
     ("spread", Aov::Spread),
     ("shaded", Aov::Shaded),
     ("samples", Aov::Samples),
+    ("base", Aov::Base),
 ];
 const LATER: [&str; 2] = ["lobes", "mip"];
 
@@ -121,6 +125,7 @@ impl Aov {
     /// The device's, on read-back.
     pub fn read(self, session: &mut Session, side: u32, directions: u32) -> Result<Vec<Channel>> {
         let name = ALL.iter().find(|(_, a)| *a == self).map_or("", |(n, _)| n);
+        let looked_up = session.config().is_some_and(|config| config.estimator == Estimator::Preconvolved);
         let covered = Pixels::read(session, "ids", side)?;
         let mask = covered.map(|t| if t[0] == 0 { 0.0 } else { 1.0 });
         // Background texels are cleared to zero bits, which every float reads as 0.
@@ -162,7 +167,18 @@ impl Aov {
                 let all = covered.of((0..covered.words.len()).map(value).collect()).map(|t| f32::from_bits(t[0]));
                 scalar(all.iter().zip(mask).map(|(v, mask)| if mask > 0.0 { *v } else { 0.0 }).collect())
             }
+            Self::Base => {
+                if !looked_up {
+                    return Err(Error::argument("--aov base", "--estimator preconvolved beside it", "another estimator"));
+                }
+                let radiance = float("radiance", "RGB", 0, session)?;
+                let covered = |(name, values): Channel| {
+                    (name, values.iter().zip(&mask).map(|(v, m)| if *m > 0.0 { *v } else { 0.0 }).collect())
+                };
+                Ok(radiance.into_iter().map(covered).collect())
+            }
             Self::Shaded | Self::Samples => {
+                let directions = if looked_up { 0 } else { directions };
                 let mut shaded = vec![0; covered.words.len()];
                 for ([x, y], _) in levels::shaded(session)? {
                     shaded[y as usize * covered.width + x as usize] = if self == Self::Shaded { 1 } else { directions };

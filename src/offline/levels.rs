@@ -1,13 +1,20 @@
 //! What the last frame decided on levels of shading, read back (`glsl/include/levels.glsl` has the encodings).
 
+use crate::Estimator;
 use crate::offline::error::Result;
 use crate::offline::session::Session;
 
-/// The samples that were shaded: x, y and the level over a sample of the cell that each stands for.
+/// The samples that were shaded: x, y and the level over a sample of the cell that each stands for. Pre-convolved light shades
+/// all that are covered.
 ///
 /// # Errors
 /// The device's, on read-back.
 pub fn shaded(session: &mut Session) -> Result<Vec<([u32; 2], u32)>> {
+    if session.config().is_some_and(|config| config.estimator == Estimator::Preconvolved) {
+        let (bytes, _, [width, _]) = session.image("ids")?;
+        let covered = (0..).zip(bytes.chunks_exact(4)).filter(|(_, id)| id.iter().any(|byte| *byte != 0));
+        return Ok(covered.map(|(i, _): (u32, _)| ([i % width, i / width], 0)).collect());
+    }
     let count = session.shaded()? as usize;
     let list = session.words("list")?;
     let levelled = session.levels().is_some_and(|levels| levels.top > 0);

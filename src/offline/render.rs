@@ -235,6 +235,7 @@ pub(super) fn report(
         Estimator::Mis => "mis",
         Estimator::Brdf => "brdf",
         Estimator::BrdfRandom => "brdf-random",
+        Estimator::Preconvolved => "preconvolved",
         Estimator::Lookup => "lookup",
     };
     let values = BTreeMap::from([

@@ -337,6 +337,11 @@ impl Session {
         &self.setup
     }
 
+    /// Settings in force.
+    pub(crate) fn config(&self) -> Option<&Config> {
+        self.renderer.as_ref().map(Renderer::config)
+    }
+
     /// Levels of shading.
     pub(crate) fn levels(&self) -> Option<Levels> {
         self.renderer.as_ref().map(|renderer| renderer.levels().clone())

@@ -8,7 +8,8 @@ use crate::gpu::recorder::{Recorder, States};
 use crate::gpu::retire::{Build, Retired};
 use crate::gpu::sampler::Samplers;
 use crate::gpu::upload::ImageUpload;
-use crate::pass::environment_bandwidth::{self, EnvironmentBandwidth, Work};
+use crate::pass::environment_bandwidth::{self, EnvironmentBandwidth};
+use crate::pass::prefilter::{self, Prefilter, Prefiltered};
 use crate::sampling::LatLong;
 use crate::sampling::environment::EnvironmentImportance;
 use ash::vk;
@@ -28,23 +29,27 @@ pub(crate) struct EnvironmentImages {
     /// R32F: cycles/radian around each direction, one value a 2x2 block of the map that is analysed; looked up with the map's
     /// own coordinates, nearest. None unless the frame predicts bandwidth.
     pub bandwidth: Option<Image>,
+    /// None unless the frame looks pre-convolved light up.
+    pub prefiltered: Option<Prefiltered>,
+}
+
+/// The passes that an upload is followed by.
+#[derive(Clone, Copy)]
+pub(crate) struct Analyses<'a> {
+    pub bandwidth: Option<&'a EnvironmentBandwidth>,
+    pub prefilter: Option<&'a Prefilter>,
 }
 
 /// Created and filled, not yet recorded.
 pub(crate) struct EnvironmentUpload {
     map: ImageUpload,
     alias: ImageUpload,
-    bandwidth: Option<Work>,
+    bandwidth: Option<environment_bandwidth::Work>,
+    prefiltered: Option<prefilter::Work>,
 }
 
 impl EnvironmentUpload {
-    /// With `bandwidth` the upload is followed by that pass.
-    pub fn new(
-        build: &mut Build<'_>,
-        map: &LatLong,
-        bandwidth: Option<&EnvironmentBandwidth>,
-        samplers: &Samplers,
-    ) -> Result<Self> {
+    pub fn new(build: &mut Build<'_>, map: &LatLong, passes: Analyses<'_>, samplers: &Samplers) -> Result<Self> {
         // Its largest sum over texels must stay finite in 32 bits.
         let brightest = map.texels().iter().flatten().copied().fold(0.0, f32::max);
         if brightest > 1e30 {
@@ -61,18 +66,22 @@ impl EnvironmentUpload {
         let alias_desc =
             desc("environment alias", vk::Format::R32G32B32A32_UINT, [SLOTS_A_ROW, slots.len() as u32 / SLOTS_A_ROW]);
         let upload = ImageUpload::new(build, radiance_desc, bytemuck::cast_slice(&radiance))?;
-        let bandwidth = bandwidth.map(|pass| pass.prepare(build, samplers, map, &upload.image)).transpose()?;
-        Ok(Self { map: upload, alias: ImageUpload::new(build, alias_desc, bytemuck::cast_slice(&slots))?, bandwidth })
+        let bandwidth = passes.bandwidth.map(|pass| pass.prepare(build, samplers, map, &upload.image)).transpose()?;
+        let prefiltered = passes.prefilter.map(|pass| pass.prepare(build, samplers, map, &upload.image)).transpose()?;
+        let alias = ImageUpload::new(build, alias_desc, bytemuck::cast_slice(&slots))?;
+        Ok(Self { map: upload, alias, bandwidth, prefiltered })
     }
 
-    /// With the pass that it was created with.
-    pub fn record(self, rec: &mut Recorder<'_>, pass: Option<&EnvironmentBandwidth>, bag: &mut Retired) -> EnvironmentImages {
+    /// With the passes that it was created with.
+    pub fn record(self, rec: &mut Recorder<'_>, passes: Analyses<'_>, bag: &mut Retired) -> EnvironmentImages {
         rec.begin(NAME);
         let (map, alias) = (self.map.record(rec, bag), self.alias.record(rec, bag));
         rec.end();
         let io = environment_bandwidth::Io { map: &map };
-        let bandwidth = self.bandwidth.zip(pass).map(|(work, pass)| pass.record(rec, &io, work, bag));
-        EnvironmentImages { map, alias, bandwidth }
+        let bandwidth = self.bandwidth.zip(passes.bandwidth).map(|(work, pass)| pass.record(rec, &io, work, bag));
+        let io = prefilter::Io { map: &map };
+        let prefiltered = self.prefiltered.zip(passes.prefilter).map(|(work, pass)| pass.record(rec, &io, work, bag));
+        EnvironmentImages { map, alias, bandwidth, prefiltered }
     }
 }
 
@@ -87,6 +96,9 @@ impl EnvironmentImages {
         for image in [self.map, self.alias].into_iter().chain(self.bandwidth) {
             states.forget(image.handle);
             image.retire(bag);
+        }
+        if let Some(prefiltered) = self.prefiltered {
+            prefiltered.retire(states, bag);
         }
     }
 }

@@ -2,6 +2,7 @@
 //! pass, `new`, `record`.
 
 pub mod bandwidth;
+pub mod base;
 pub mod classify;
 pub mod curvature;
 pub mod environment;
@@ -13,6 +14,7 @@ pub mod luminance;
 pub(crate) mod maps;
 pub mod materials;
 pub mod modules;
+pub mod prefilter;
 #[cfg(feature = "offline")]
 pub(crate) mod probe;
 pub mod pyramid;
@@ -51,9 +53,10 @@ pub(crate) struct PassContext<'a, 'b> {
 pub fn interfaces() -> Vec<Interface> {
     let mut all = vec![filter::INTERFACE, curvature::INTERFACE, bandwidth::BLOCKS, bandwidth::INTERFACE, pyramid::INTERFACE];
     all.extend(classify::INTERFACES);
-    all.extend([shade::INTERFACE, upsample::INTERFACE, resolve::INTERFACE]);
+    all.extend([base::INTERFACE, shade::INTERFACE, upsample::INTERFACE, resolve::INTERFACE]);
     all.extend(tonemap::INTERFACES);
     all.extend(environment_bandwidth::INTERFACES);
     all.extend(luminance::INTERFACES);
+    all.extend(prefilter::INTERFACES);
     all
 }

@@ -16,14 +16,25 @@ use ash::vk::DescriptorType as D;
 /// Module and label name.
 pub const NAME: &str = "probe";
 
-/// Shader interface: set 1 the material bridge; set 2 the frame, the environment's two images, input and output.
+/// Shader interface: set 1 the material bridge; set 2 the frame, the environment's two images, input and output, and what
+/// `glsl/include/prefilter.glsl` reads.
 pub const INTERFACE: Interface = Interface {
     name: NAME,
     local_size: [64, 1, 1],
     push_bytes: 4,
     gbuffer: false,
     materials: true,
-    own: &[D::UNIFORM_BUFFER, D::COMBINED_IMAGE_SAMPLER, D::COMBINED_IMAGE_SAMPLER, D::STORAGE_BUFFER, D::STORAGE_BUFFER],
+    own: &[
+        D::UNIFORM_BUFFER,
+        D::COMBINED_IMAGE_SAMPLER,
+        D::COMBINED_IMAGE_SAMPLER,
+        D::STORAGE_BUFFER,
+        D::STORAGE_BUFFER,
+        D::COMBINED_IMAGE_SAMPLER,
+        D::COMBINED_IMAGE_SAMPLER,
+        D::COMBINED_IMAGE_SAMPLER,
+        D::STORAGE_BUFFER,
+    ],
 };
 
 pub(crate) struct Io<'a> {
@@ -50,15 +61,28 @@ impl Probe {
         rec.begin(NAME);
         io.environment.sampled(rec);
         io.materials.sampled(rec);
+        if let Some(prefiltered) = &io.environment.prefiltered {
+            prefiltered.sampled(rec);
+        }
         rec.buffer(io.input, Access::COMPUTE_READ);
         rec.buffer(io.output, Access::COMPUTE_WRITE);
         rec.flush();
+        // Without pre-convolved light others stand in, unread.
+        let map = Resource::Sampled(&io.environment.map, io.samplers.linear);
+        let [first, second, irradiance, suns] = match &io.environment.prefiltered {
+            Some(prefiltered) => prefiltered.resources(io.samplers),
+            None => [map, map, map, Resource::Buffer(io.input)],
+        };
         let resources = [
             Resource::Uniform(io.frame),
             Resource::Sampled(&io.environment.map, io.samplers.linear),
             Resource::Sampled(&io.environment.alias, io.samplers.nearest),
             Resource::Buffer(io.input),
             Resource::Buffer(io.output),
+            first,
+            second,
+            irradiance,
+            suns,
         ];
         self.0.bind(rec, io.bridge, &resources, &io.count);
         self.0.dispatch(rec, [io.count, 1]);

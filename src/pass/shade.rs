@@ -76,7 +76,7 @@ impl Shade {
     /// `levelled` says whether entries of the list stand for cells of levels.
     pub fn new(p: &mut PassContext<'_, '_>, config: &Config, levelled: bool) -> Result<Self> {
         let constant = match config.estimator {
-            Estimator::Mis => 0,
+            Estimator::Mis | Estimator::Preconvolved => 0,
             Estimator::Brdf => 1,
             Estimator::BrdfRandom => 2,
             Estimator::Lookup => 3,

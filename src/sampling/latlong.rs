@@ -46,6 +46,11 @@ impl LatLong {
         &self.texels
     }
 
+    /// Replaces the texel in a column and row of the map, by a finite radiance that is not negative.
+    pub(crate) fn set(&mut self, [x, y]: [u32; 2], radiance: [f32; 3]) {
+        self.texels[(y * self.width + x) as usize] = radiance;
+    }
+
     /// The texel in column `x` (wrapped) and row `y` (clamped).
     pub fn texel(&self, x: i64, y: i64) -> DVec3 {
         let x = x.rem_euclid(i64::from(self.width)) as usize;

@@ -66,7 +66,7 @@ pub struct Args {
     #[arg(long, value_name = "PATH=VALUE", value_parser = assignment)]
     set: Vec<(String, String)>,
     /// Extra layers of an EXR: depth, normal, material, object, uv, footprint, curvature, level,
-    /// weight, shaded, samples
+    /// weight, shaded, samples, base (with --estimator preconvolved)
     #[arg(long, value_name = "NAME", value_delimiter = ',')]
     aov: Vec<String>,
     /// A converged full-rate image of N directions a pixel instead
@@ -187,8 +187,9 @@ impl Args {
             Method::Mis => Estimator::Mis,
             Method::Brdf => Estimator::Brdf,
             Method::BrdfRandom => Estimator::BrdfRandom,
-            Method::Preconvolved | Method::Cv | Method::Residual => {
-                return Err(Error::NotSupportedYet { what: "--estimator preconvolved, cv and residual".into() });
+            Method::Preconvolved => Estimator::Preconvolved,
+            Method::Cv | Method::Residual => {
+                return Err(Error::NotSupportedYet { what: "--estimator cv and residual".into() });
             }
         };
         if !FILTERS.contains(&self.filter.as_str()) && self.filter != "supersample" {

@@ -1,0 +1,67 @@
+// What pre-convolved light is looked up with: a material seen from one direction as lobes of light directions, and its diffuse
+// part. src/distribution/reflected.rs is the f64 twin. Include after materials.glsl.
+#ifndef REFLECTED_GLSL
+#define REFLECTED_GLSL
+#include "vmf.glsl"
+
+struct ReflectedLobe {
+    vec3 direction; // centre, in the local frame, unit
+    float kappa;
+    vec3 weight;    // factor on the light under the lobe, cosine included; 0 where its centre is not seen or below the horizon
+};
+
+uint reflected_count(Material m) {
+    return m.record.kind.x == REFLECTANCE_VMF ? m.record.kind.z : 1u;
+}
+
+// Lobe i seen from wo. Kinds share the look-up, so that there is one for all.
+ReflectedLobe reflected_lobe(Material m, uint i, vec3 wo) {
+    uint kind = m.record.kind.x;
+    vec3 centre = vec3(0.0, 0.0, 1.0);
+    float kappa, peak; // of half vectors
+    if (kind == REFLECTANCE_GGX) {
+        kappa = 2.0 / (m.record.f0.a * m.record.f0.a);
+        peak = kappa * (0.5 * INV_PI);
+    } else if (kind == REFLECTANCE_BLINN_PHONG) {
+        kappa = m.record.f0.a + 2.0;
+        peak = m.peaks.x;
+    } else {
+        vec3 mu = materials[m.record.kind.y + i].f0.xyz;
+        vec2 lobe = material_lobe(m, m.record.kind.y + i);
+        kappa = lobe.x;
+        peak = lobe.y;
+        // The tangent frame's own handedness first, then the turn back.
+        mu.y *= m.turn.z;
+        centre = vec3(m.turn.x * mu.x + m.turn.y * mu.y, m.turn.x * mu.y - m.turn.y * mu.x, mu.z);
+    }
+    float cosine = dot(wo, centre);
+    ReflectedLobe lobe;
+    lobe.direction = centre * (2.0 * cosine) - wo;
+    bool seen = cosine > 0.0 && lobe.direction.z > 0.0;
+    cosine = seen ? cosine : 1.0;
+    vec3 wi = seen ? lobe.direction : wo;
+    lobe.kappa = kappa / (4.0 * cosine);
+    vec3 value;
+    if (kind == REFLECTANCE_GGX) {
+        float c = clamp(1.0 - cosine, 0.0, 1.0), c2 = c * c;
+        float a2 = m.record.f0.a * m.record.f0.a;
+        value = (m.record.f0.rgb + (1.0 - m.record.f0.rgb) * (c2 * c2 * c)) / (ggx_masking(wi.z, a2) * ggx_masking(wo.z, a2));
+    } else {
+        value = m.record.f0.rgb * cavity_masking(wi, wo, centre);
+    }
+    lobe.weight = seen ? value * (wi.z * peak / vmf_normalisation(lobe.kappa)) : vec3(0.0);
+    return lobe;
+}
+
+// Factor on irradiance in 1/sr.
+vec3 reflected_diffuse(Material m, vec3 wo) {
+    vec3 base = m.record.albedo.rgb * INV_PI;
+    if (m.record.kind.x == REFLECTANCE_GGX) {
+        // Fresnel towards the mean direction of diffuse light, the normal.
+        float c = 1.0 - sqrt(0.5 + 0.5 * wo.z), c2 = c * c;
+        base *= 1.0 - (m.record.f0.rgb + (1.0 - m.record.f0.rgb) * (c2 * c2 * c));
+    }
+    return base;
+}
+
+#endif

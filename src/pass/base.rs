@@ -1,0 +1,120 @@
+//! Pass 7: noise-free radiance at every sample, from the environment pre-convolved by the material's lobes
+//! ([`crate::distribution::reflected`] and [`crate::distribution::prefilter`] are the f64 twins).
+
+use crate::config::Config;
+use crate::error::{Error, Result};
+use crate::gpu::access::Access;
+use crate::gpu::buffer::Buffer;
+use crate::gpu::image::Image;
+use crate::gpu::pipeline::{BridgeSets, ComputePipeline, Interface, Resource};
+use crate::gpu::recorder::Recorder;
+use crate::gpu::retire::Retired;
+use crate::gpu::sampler::Samplers;
+use crate::light::Light;
+use crate::material::Material;
+use crate::pass::PassContext;
+use crate::pass::materials::MaterialImages;
+use crate::pass::prefilter::Prefiltered;
+use crate::reflectance::Model;
+use ash::vk::DescriptorType as D;
+
+/// Pass, shader, label, timer and AOV name.
+pub const NAME: &str = "base";
+
+/// Shader interface.
+pub const INTERFACE: Interface = Interface {
+    name: NAME,
+    local_size: [8, 8, 1],
+    push_bytes: 0,
+    gbuffer: true,
+    materials: true,
+    own: &[
+        D::UNIFORM_BUFFER,
+        D::COMBINED_IMAGE_SAMPLER,
+        D::COMBINED_IMAGE_SAMPLER,
+        D::STORAGE_BUFFER,
+        D::STORAGE_IMAGE,
+        D::COMBINED_IMAGE_SAMPLER,
+        D::COMBINED_IMAGE_SAMPLER,
+        D::COMBINED_IMAGE_SAMPLER,
+        D::STORAGE_BUFFER,
+    ],
+};
+
+pub(crate) struct Io<'a> {
+    pub frame: &'a Buffer,
+    pub bridge: BridgeSets,
+    pub samplers: &'a Samplers,
+    /// Of the `filter` pass.
+    pub normals: &'a Image,
+    pub factors: &'a Image,
+    pub prefiltered: &'a Prefiltered,
+    pub materials: &'a MaterialImages,
+    /// Exact ones, as [`check_lights`] says.
+    pub lights: &'a Buffer,
+    pub light_count: u32,
+    /// Out: linear radiance where covered.
+    pub radiance: &'a Image,
+}
+
+/// One pipeline for frames without lights beside the environment, one for frames with.
+pub(crate) struct Base([ComputePipeline; 2]);
+
+/// Refuses materials that have no lobes of their own.
+pub(crate) fn check_materials(materials: &[Material]) -> Result<()> {
+    let table = |m: &Material| matches!(m.model, Model::Table(_) | Model::Turned(_));
+    match materials.iter().position(table) {
+        Some(i) => {
+            let expected = "ggx, blinn_phong or vmf for pre-convolved light";
+            Err(Error::invalid(format!("materials[{i}].reflectance"), expected, "table"))
+        }
+        None => Ok(()),
+    }
+}
+
+/// Refuses lights that would have to be sampled.
+pub(crate) fn check_lights(lights: &[Light]) -> Result<()> {
+    match lights.iter().position(Light::is_area) {
+        Some(i) => Err(Error::invalid(format!("lights[{i}]"), "a point or a direction for pre-convolved light", "an area")),
+        None => Ok(()),
+    }
+}
+
+impl Base {
+    pub fn new(p: &mut PassContext<'_, '_>, config: &Config) -> Result<Self> {
+        let mut make = |lights| {
+            ComputePipeline::new(p.build, p.modules, &INTERFACE, p.bridge, p.slots, &[u32::from(config.widened()), lights])
+        };
+        Ok(Self([make(0)?, make(1)?]))
+    }
+
+    pub fn record(&self, rec: &mut Recorder<'_>, io: &Io<'_>) {
+        rec.begin(NAME);
+        io.prefiltered.sampled(rec);
+        io.materials.sampled(rec);
+        rec.image(io.normals, Access::COMPUTE_SAMPLED);
+        rec.image(io.factors, Access::COMPUTE_SAMPLED);
+        rec.overwrite(io.radiance, Access::COMPUTE_WRITE);
+        rec.flush();
+        let [first, second, irradiance, suns] = io.prefiltered.resources(io.samplers);
+        let resources = [
+            Resource::Uniform(io.frame),
+            Resource::Sampled(io.normals, io.samplers.nearest),
+            Resource::Sampled(io.factors, io.samplers.nearest),
+            Resource::Buffer(io.lights),
+            Resource::Storage(io.radiance.view),
+            first,
+            second,
+            irradiance,
+            suns,
+        ];
+        let pipeline = &self.0[usize::from(io.light_count > 0)];
+        pipeline.bind(rec, io.bridge, &resources, &());
+        pipeline.dispatch(rec, io.normals.extent());
+        rec.end();
+    }
+
+    pub fn retire(self, bag: &mut Retired) {
+        self.0.into_iter().for_each(|p| p.retire(bag));
+    }
+}
