@@ -44,7 +44,7 @@ pub struct Settings {
     pub filter: Filter,
     /// Whether the mesh's curvature widens lobes, whatever the filter.
     pub geometric: bool,
-    /// Directions a shaded sample.
+    /// Directions a shaded sample; with several a pixel as [`Config::directions`] says.
     pub samples: u32,
     /// Estimator.
     pub estimator: Estimator,
@@ -148,7 +148,7 @@ pub fn render(world: &World, settings: &Settings, progress: &mut dyn FnMut(u32, 
     let [width, height] = settings.extent;
     let mut channels: Vec<_> = ["R", "G", "B", "A"].iter().enumerate().map(|(c, n)| (n.to_string(), channel(c))).collect();
     for aov in &settings.aovs {
-        channels.extend(aov.read(&mut session, settings.samples_per_side, config.directions)?);
+        channels.extend(aov.read(&mut session, settings.samples_per_side, &sample_directions(world, &config))?);
     }
 
     // A frame's times arrive when its slot is recorded again.
@@ -165,6 +165,15 @@ pub fn render(world: &World, settings: &Settings, progress: &mut dyn FnMut(u32, 
     Ok(Rendered { image: LinearImage { width, height, channels }, stats })
 }
 
+/// Directions of a sample that stands for a cell of a level, in levels over a sample.
+fn sample_directions(world: &World, config: &Config) -> impl Fn(u32) -> u32 {
+    let area_lights = world.lights.iter().filter(|l| l.is_area()).count() as u32;
+    let shines = world.environment.as_ref().is_some_and(|e| e.intensity > 0.0);
+    let directions = Directions::of(config, shines, area_lights);
+    let config = config.clone();
+    move |level| directions.at(level, &config).total(area_lights)
+}
+
 /// Statistics of the session's last frame and of the times of some.
 pub(crate) fn statistics(
     world: &World,
@@ -175,15 +184,15 @@ pub(crate) fn statistics(
 ) -> Result<Stats> {
     let pixel = config.samples_per_side.ilog2() as i32;
     let mut by_level = BTreeMap::new();
+    let directions = sample_directions(world, config);
+    let mut taken = 0;
     for (_, level) in levels::shaded(session)? {
+        taken += u64::from(directions(level));
         *by_level.entry(level as i32 - pixel).or_insert(0) += 1;
     }
     let shaded = by_level.values().sum();
     let (ids, ..) = session.image("ids")?;
     let covered = ids.chunks_exact(4).filter(|id| id.iter().any(|byte| *byte != 0)).count() as u64;
-    let area_lights = world.lights.iter().filter(|l| l.is_area()).count() as u32;
-    let shines = world.environment.as_ref().is_some_and(|e| e.intensity > 0.0);
-    let taken = shaded * u64::from(Directions::of(config, shines, area_lights).total(area_lights));
     let estimator = match config.estimator {
         Estimator::Mis => "mis",
         Estimator::Brdf => "brdf",
