@@ -1,8 +1,7 @@
 #version 460
 // Image bandwidth and level of every block of samples (Bagher 2011, sections 2.1 to 2.3, equations 3, 4 and 9, as corrected in
 // src/frequency): a few directions drawn from the reflectance tell how fast light and lobe vary where light comes from, the
-// surface's curvature and distance how fast that makes the image vary. One sample stands for a block of 2x2 samples, or of an
-// output pixel's if these are more.
+// surface's curvature and distance how fast that makes the image vary. One sample stands for a block of 2x2 output pixels.
 layout(set = 2, binding = 3) uniform sampler2D normals;  // as the filter pass writes them
 layout(constant_id = 2) const bool KERNEL = false;
 #define MATERIAL_KERNEL KERNEL
@@ -169,9 +168,9 @@ int predict(uint entry) {
     for (k = 0; k < push.side * push.side; ++k) {
         ivec2 p = first + ivec2(k % push.side, k / push.side);
         if (all(lessThan(p, extent))) {
-            // Another object in the block is shaded as it is.
+            // Another object in the block is shaded once a pixel, or as finely as its edges need.
             bool same = !gbuffer_covered(p) || gbuffer_object(p) == c.object;
-            imageStore(level, p, uvec4(same ? found : 0));
+            imageStore(level, p, uvec4(same ? found : min(found, findMSB(push.side) - 1)));
         }
     }
     return found;

@@ -26,6 +26,8 @@ const uint ESTIMATOR_LOOKUP = 3u;
 layout(constant_id = 1) const bool LOCAL_LIGHTS = false;
 // Whether entries are samples that stand for cells of some level, or all samples.
 layout(constant_id = 2) const bool LEVELLED = false;
+// So many levels below a pixel's share the pixel's directions.
+layout(constant_id = 4) const int SHARING = 0;
 
 layout(set = 2, binding = 3, std430) readonly buffer Arguments {
     uint groups_x, groups_y, groups_z;
@@ -44,10 +46,25 @@ layout(set = 2, binding = 8) uniform sampler2D normals;  // as the filter pass w
 layout(set = 2, binding = 9) uniform usampler2D factors;
 
 layout(push_constant) uniform Push {
-    uint brdf_samples;
+    uint brdf_samples;        // of a sample that stands for a pixel or more
     uint environment_samples;
     uint light_samples; // for each area light
 } push;
+
+// This sample's.
+uint brdf_samples, environment_samples, light_samples;
+
+// What a sample `finer` levels below a pixel's gets of the pixel's directions (src/plan.rs, Directions::at).
+uint share(uint n, int finer) {
+    return max(n >> uint(2 * finer), min(n, 1u));
+}
+
+// Whose turn it is on the pixel's one sequence of points: that of a cell of level l, in an order in which a cell has the points
+// of its children. A pixel's samples, averaged, are then as well spread as the points of one.
+uint turn(ivec2 p, int l, int finer) {
+    ivec2 inside = (p >> l) & ((1 << finer) - 1);
+    return uint((inside.x & 1) | (inside.y & 1) << 1 | (inside.x & 2) << 1 | (inside.y & 2) << 2);
+}
 
 // Contribution of a direction drawn from the reflectance, seen from world point p. The environment and every area light
 // weigh it against their own samples (balance heuristic, one light at a time: lights add up).
@@ -64,12 +81,12 @@ vec3 brdf_contribution(Local f, Material m, vec3 p, uvec2 u) {
     float jacobian = 0.25 / cos_d;
     bool alone = ESTIMATOR != ESTIMATOR_MIS;
     float weight_density = alone ? h.w : material_density(m, h.xyz);
-    float brdf = float(push.brdf_samples) * weight_density * jacobian;
-    float environment = alone ? 0.0 : float(push.environment_samples) * environment_per_steradian(light.a, length(w.xz));
+    float brdf = float(brdf_samples) * weight_density * jacobian;
+    float environment = alone ? 0.0 : float(environment_samples) * environment_per_steradian(light.a, length(w.xz));
     vec3 sum = light.rgb / (brdf + environment);
     for (uint i = 0u; LOCAL_LIGHTS && i < frame.lights.y; ++i) {
         float density = light_density(lights[frame.lights.x + i], p, w);
-        float competing = alone ? 0.0 : float(push.light_samples) * density;
+        float competing = alone ? 0.0 : float(light_samples) * density;
         sum += density > 0.0 ? lights[frame.lights.x + i].power.rgb / (brdf + competing) : vec3(0.0);
     }
     return value * sum * (weight_density / h.w);
@@ -86,8 +103,8 @@ vec3 environment_contribution(Local f, Material m, uvec2 u) {
     wi = above ? wi : vec3(0.0, 0.0, 1.0);
     vec4 light = environment_fetch(uv);
     vec3 h = normalize(wi + f.view);
-    float environment = float(push.environment_samples) * environment_per_steradian(light.a, w.w);
-    float brdf = float(push.brdf_samples) * material_density(m, h) * 0.25 / dot(f.view, h);
+    float environment = float(environment_samples) * environment_per_steradian(light.a, w.w);
+    float brdf = float(brdf_samples) * material_density(m, h) * 0.25 / dot(f.view, h);
     vec3 value = material_evaluate(m, wi, f.view, h) * light.rgb * wi.z / (brdf + environment);
     return above ? value : vec3(0.0);
 }
@@ -101,8 +118,8 @@ vec3 light_contribution(Local f, Material m, vec3 p, LightRecord light, uvec2 u)
         return vec3(0.0);
     }
     vec3 h = normalize(wi + f.view);
-    float brdf = float(push.brdf_samples) * material_density(m, h) * 0.25 / dot(f.view, h);
-    return material_evaluate(m, wi, f.view, h) * light.power.rgb * wi.z / (brdf + float(push.light_samples) * density);
+    float brdf = float(brdf_samples) * material_density(m, h) * 0.25 / dot(f.view, h);
+    return material_evaluate(m, wi, f.view, h) * light.power.rgb * wi.z / (brdf + float(light_samples) * density);
 }
 
 // What the exact lights add.
@@ -143,6 +160,19 @@ void main() {
     uint entry = list[index];
     ivec2 p = LEVELLED ? list_sample(entry) : ivec2(entry & 0xffffu, entry >> 16);
     int l = LEVELLED ? list_level(entry) : 0;
+    brdf_samples = push.brdf_samples;
+    environment_samples = push.environment_samples;
+    light_samples = push.light_samples;
+    uint before = 0u;
+    ivec2 whose = p;
+    if (SHARING != 0) {
+        int finer = max(SHARING - l, 0);
+        brdf_samples = share(brdf_samples, finer);
+        environment_samples = share(environment_samples, finer);
+        light_samples = share(light_samples, finer);
+        before = turn(p, l, finer);
+        whose = p >> SHARING;
+    }
     vec3 ray = frame_ray(p);
     vec4 normal = texelFetch(normals, p, 0);
     Local f = local_frame(normal.xyz, -normalize(ray));
@@ -150,28 +180,29 @@ void main() {
     Material m = material_load(gbuffer_material(p), f.view.z, tangent_turn(f, tangent_decode(normal.xyz, normal.w)),
         factors_unpack(texelFetch(factors, p, 0)));
 
-    uint seed = hash((uint(p.y) << 16 | uint(p.x)) ^ hash(frame.sampling.x ^ hash(frame.sampling.y)));
+    uint seed = hash((uint(whose.y) << 16 | uint(whose.x)) ^ hash(frame.sampling.x ^ hash(frame.sampling.y)));
     vec3 sum = vec3(0.0);
     if (ESTIMATOR == ESTIMATOR_LOOKUP) {
-        for (uint i = 0u; i < push.brdf_samples; ++i) {
+        for (uint i = 0u; i < brdf_samples; ++i) {
             sum += lookup(f, m, hash(seed + i));
         }
         store(p, l, sum);
         return;
     }
     uvec2 seeds = sobol_seeds(seed);
-    for (uint i = 0u; i < push.brdf_samples; ++i) {
-        sum += brdf_contribution(f, m, at, ESTIMATOR == ESTIMATOR_BRDF_RANDOM ? random_point(i, seed) : sobol_point(i, seeds));
+    for (uint i = 0u; i < brdf_samples; ++i) {
+        uint point = before * brdf_samples + i;
+        sum += brdf_contribution(f, m, at, ESTIMATOR == ESTIMATOR_BRDF_RANDOM ? random_point(point, seed) : sobol_point(point, seeds));
     }
     if (ESTIMATOR == ESTIMATOR_MIS) {
         seeds = sobol_seeds(seed + 1u);
-        for (uint i = 0u; i < push.environment_samples; ++i) {
-            sum += environment_contribution(f, m, sobol_point(i, seeds));
+        for (uint i = 0u; i < environment_samples; ++i) {
+            sum += environment_contribution(f, m, sobol_point(before * environment_samples + i, seeds));
         }
         for (uint k = 0u; LOCAL_LIGHTS && k < frame.lights.y; ++k) {
             seeds = sobol_seeds(seed + 2u + k);
-            for (uint i = 0u; i < push.light_samples; ++i) {
-                sum += light_contribution(f, m, at, lights[frame.lights.x + k], sobol_point(i, seeds));
+            for (uint i = 0u; i < light_samples; ++i) {
+                sum += light_contribution(f, m, at, lights[frame.lights.x + k], sobol_point(before * light_samples + i, seeds));
             }
         }
     }

@@ -86,7 +86,7 @@ pub struct Config {
     pub rate: Rate,
     /// Coarsest level of all rates but [`Rate::Full`] and [`Rate::Uniform`], 0 to 5, in output pixels; no cell is wider than 32 samples.
     pub lmax: u32,
-    /// Directions in which the prediction looks, 1 to 256 a block of 2x2 samples (of a pixel, if that has more).
+    /// Directions in which the prediction looks, 1 to 256 a block of 2x2 pixels.
     pub probes: u32,
     /// Samples that a predicted cycle gets; by [`crate::frequency::level::samples_per_cycle`] if `None`.
     pub samples_per_cycle: Option<f32>,
@@ -101,7 +101,9 @@ pub struct Config {
     pub filter: Filter,
     /// Whether the mesh's curvature widens lobes as [`Filter::Tk`] does, whatever the filter.
     pub geometric: bool,
-    /// Directions a shaded sample, 1 to 65536; at least 2 for [`Estimator::Mis`].
+    /// Directions a shaded sample, 1 to 65536; at least 2 for [`Estimator::Mis`]. Where [`Rate::Bandwidth`] chooses among several
+    /// samples a pixel, whatever stands for a pixel or more gets [`Config::samples_per_side`] times as many, and each finer level a
+    /// quarter of the level above.
     pub directions: u32,
     /// Whether the curvature pass runs (an output of its own until something in the frame reads it).
     pub curvature: bool,
@@ -140,9 +142,21 @@ impl Config {
         self.geometric || self.filter == Filter::Tk
     }
 
-    /// Samples a side of the blocks that the prediction works on.
+    /// Samples a side of the blocks that the prediction works on: 2x2 pixels.
     pub(crate) fn block_side(&self) -> u32 {
-        self.samples_per_side.max(2)
+        2 * self.samples_per_side
+    }
+
+    /// Levels below a pixel's that share the pixel's directions. As many a pixel whatever its level make noise the same there,
+    /// and edges, where fine samples are needed, cost no more than other pixels.
+    pub(crate) fn sharing_levels(&self) -> u32 {
+        if self.rate == Rate::Bandwidth { self.samples_per_side.ilog2() } else { 0 }
+    }
+
+    /// Directions of a sample that stands for a pixel or more: halfway, in decibels of noise, between those of one sample and of
+    /// all samples of a pixel.
+    pub(crate) fn directions_a_pixel(&self) -> u32 {
+        self.directions << self.sharing_levels()
     }
 
     /// The coarsest level of shading, in levels over a sample: 0 where every sample is shaded.

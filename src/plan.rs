@@ -194,10 +194,10 @@ pub(crate) struct Directions {
 }
 
 impl Directions {
-    /// Half of the configured number from the reflectance; the other half in equal parts from the environment, if it shines,
-    /// and each of `area_lights`, at least one each.
+    /// Of a sample that stands for a pixel or more: half of the number from the reflectance; the other half in equal parts from
+    /// the environment, if it shines, and each of `area_lights`, at least one each.
     pub fn of(config: &Config, environment: bool, area_lights: u32) -> Self {
-        let n = if config.estimator == crate::Estimator::Preconvolved { 0 } else { config.directions };
+        let n = if config.estimator == crate::Estimator::Preconvolved { 0 } else { config.directions_a_pixel() };
         let sources = u32::from(environment) + area_lights;
         if config.estimator != crate::Estimator::Mis || sources == 0 {
             return Self { brdf: n, environment: 0, light: 0 };
@@ -205,6 +205,13 @@ impl Directions {
         let light = if area_lights > 0 { (n / 2 / sources).max(1) } else { 0 };
         let rest = (n / 2).saturating_sub(light * area_lights).max(1);
         Self { brdf: n.div_ceil(2), environment: if environment { rest } else { 0 }, light }
+    }
+
+    /// Of a sample that stands for a cell of `level`, in levels over a sample (twin of `share` in `glsl/shade.comp`).
+    #[cfg(any(test, feature = "offline"))]
+    pub fn at(self, level: u32, config: &Config) -> Self {
+        let share = |n: u32| (n >> (2 * config.sharing_levels().saturating_sub(level))).max(n.min(1));
+        Self { brdf: share(self.brdf), environment: share(self.environment), light: share(self.light) }
     }
 
     /// All directions of a sample.
@@ -291,6 +298,23 @@ mod tests {
         assert_eq!((d.environment, d.light), (1, 1));
         let brdf = Config { estimator: crate::Estimator::Brdf, ..config };
         assert_eq!(Directions::of(&brdf, true, 3), Directions { brdf: 64, environment: 0, light: 0 });
+    }
+
+    #[test]
+    fn finer_levels_share_a_pixels_directions() {
+        let adaptive = |side| Config { rate: Rate::Bandwidth, samples_per_side: side, ..Config::new([1, 1]) };
+        for (side, totals) in [(1, [64, 64, 64]), (2, [32, 128, 128]), (4, [16, 64, 256])] {
+            let config = adaptive(side);
+            let d = Directions::of(&config, true, 0);
+            assert_eq!([0, 1, 2].map(|level| d.at(level, &config).total(0)), totals);
+            assert_eq!(d.at(5, &config), d);
+            let full = Config { rate: Rate::Full, ..config };
+            let d = Directions::of(&full, true, 0);
+            assert_eq!((d.total(0), d.at(0, &full)), (64, d));
+        }
+        let few = Config { directions: 2, ..adaptive(4) };
+        assert_eq!(Directions::of(&few, true, 1).at(0, &few), Directions { brdf: 1, environment: 1, light: 1 });
+        assert_eq!(Directions::of(&few, false, 0).at(0, &few).environment, 0, "without light nothing is drawn from it");
     }
 
     #[test]

@@ -66,12 +66,13 @@ fn against_the_twin(world: &World, base: &Config, variants: &[(Operator, Combine
     let twin = Twin::new(world, base.eps);
     for &(operator, combine) in variants {
         let config = Config { operator, combine, curvature: true, ..base.clone() };
-        let side = config.samples_per_side.max(2) as usize;
+        let side = 2 * config.samples_per_side as usize;
         let mut session = session(world, &config);
         session.frame([9, 3]).unwrap();
         assert_eq!(session.messages(), [""; 0]);
         let frame = Frame::read(&mut session);
-        let rate = config.samples_per_cycle.map_or(samples_per_cycle(config.directions), f64::from);
+        let a_pixel = config.directions * config.samples_per_side;
+        let rate = config.samples_per_cycle.map_or(samples_per_cycle(a_pixel), f64::from);
         let top = (config.lmax + config.samples_per_side.ilog2()).min(5) as i32;
         let (mut blocks, mut borders, mut worst, mut by_level) = (0.0, 0.0, 0.0f64, [0; 6]);
         for (block, &[got, spread, ..]) in frame.prediction.iter().enumerate() {
@@ -88,10 +89,12 @@ fn against_the_twin(world: &World, base: &Config, variants: &[(Operator, Combine
             // Of the exact value and of what is written of it: they differ where rounding crosses a border.
             let half = got * 1e-3 + 1e-7;
             let range = [got + half, got - half].map(|b| level(b, rate, [0, top]) as u32);
+            // Of another object, at most a pixel's.
+            let others = range.map(|l| l.min(config.samples_per_side.ilog2()));
             let own = level(found.bandwidth, rate, [0, top]) as u32;
             for (p, _) in frame.samples(block, side) {
                 let same = frame.ids[p] == 0 || (frame.ids[p] - 1) >> 16 == (frame.ids[found.at] - 1) >> 16;
-                let expected = if same { range } else { [0; 2] };
+                let expected = if same { range } else { others };
                 assert!((expected[0]..=expected[1]).contains(&frame.levels[p]), "{}: {}", at(), frame.levels[p]);
                 let within = |f: f64| level(found.bandwidth + f * BANDWIDTH * found.terms, rate, [0, top]) as u32;
                 assert!(!near || !same || within(1.0) != within(-1.0) || frame.levels[p] == own, "{}: {own}", at());
@@ -102,7 +105,7 @@ fn against_the_twin(world: &World, base: &Config, variants: &[(Operator, Combine
             "{} {operator:?} {combine:?}: worst of {blocks} blocks {worst:.1e}, {borders} at borders, samples by level {by_level:?}",
             world.name
         );
-        assert!(blocks > 150.0 && borders <= BORDERS * blocks, "{borders} of {blocks}");
+        assert!(blocks > 100.0 && borders <= BORDERS * blocks, "{borders} of {blocks}");
     }
 }
 
@@ -131,7 +134,8 @@ fn the_pass_is_as_its_twin() {
     lit.materials[0].maps = Maps { tiling: [3.0, 0.7], ..half_checks() };
     let finer = Config { eps: 0.03, samples_per_side: 4, probes: 4, ..predicted([33, 29], 64) };
     against_the_twin(&lit, &finer, &[clipped(Combine::Mean), clipped(Combine::Literal)]);
-    let pixels = Config { samples_per_side: 2, ..predicted([41, 35], 64) };
+    // Few enough that the frame does not fall back.
+    let pixels = Config { samples_per_side: 2, samples_per_cycle: Some(1.0), ..predicted([41, 35], 64) };
     against_the_twin(&lit, &pixels, &[(Operator::Covariance, Combine::Max)]);
 }
 

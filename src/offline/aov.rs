@@ -119,11 +119,11 @@ impl Aov {
         self == Self::Curvature
     }
 
-    /// The layer's channels after a frame of `side` samples a side and `directions` a sample.
+    /// The layer's channels after a frame of `side` samples a side and as many `directions` a sample of each level.
     ///
     /// # Errors
     /// The device's, on read-back.
-    pub fn read(self, session: &mut Session, side: u32, directions: u32) -> Result<Vec<Channel>> {
+    pub fn read(self, session: &mut Session, side: u32, directions: &dyn Fn(u32) -> u32) -> Result<Vec<Channel>> {
         let name = ALL.iter().find(|(_, a)| *a == self).map_or("", |(n, _)| n);
         let looked_up = session.config().is_some_and(|config| config.estimator == Estimator::Preconvolved);
         let covered = Pixels::read(session, "ids", side)?;
@@ -156,7 +156,7 @@ impl Aov {
                 let none = |_| Error::argument(format!("--aov {name}"), "--rate bandwidth beside it", "another rate");
                 let (bytes, _, [width, _]) = session.image("prediction").map_err(none)?;
                 let halves: Vec<half::f16> = bytemuck::pod_collect_to_vec(&bytes);
-                let block = side.max(2) as usize;
+                let block = 2 * side as usize;
                 // Of samples to of pixels.
                 let unit = if self == Self::Bandwidth { side as f32 } else { 1.0 };
                 let value = |i: usize| {
@@ -178,10 +178,9 @@ impl Aov {
                 Ok(radiance.into_iter().map(covered).collect())
             }
             Self::Shaded | Self::Samples => {
-                let directions = if looked_up { 0 } else { directions };
                 let mut shaded = vec![0; covered.words.len()];
-                for ([x, y], _) in levels::shaded(session)? {
-                    shaded[y as usize * covered.width + x as usize] = if self == Self::Shaded { 1 } else { directions };
+                for ([x, y], level) in levels::shaded(session)? {
+                    shaded[y as usize * covered.width + x as usize] = if self == Self::Shaded { 1 } else { directions(level) };
                 }
                 scalar(covered.of(shaded).map(|t| t[0] as f32))
             }

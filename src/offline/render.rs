@@ -46,7 +46,7 @@ pub struct Settings {
     pub filter: Filter,
     /// Whether the mesh's curvature widens lobes, whatever the filter.
     pub geometric: bool,
-    /// Directions a shaded sample.
+    /// Directions a shaded sample; with several a pixel as [`Config::directions`] says.
     pub samples: u32,
     /// Estimator.
     pub estimator: Estimator,
@@ -140,7 +140,7 @@ pub fn render(world: &World, settings: &Settings, progress: &mut dyn FnMut(u32, 
     let chunks = settings.chunks();
     let total = chunks + if settings.timed { WARM_UP + TIMED } else { 0 };
     let mut done = 0;
-    let image = image(&mut session, settings, &config, 0, &mut |_| {
+    let image = image(&mut session, world, settings, &config, 0, &mut |_| {
         done += 1;
         progress(done, total);
     })?;
@@ -170,6 +170,7 @@ pub(super) fn open(world: &World, settings: &Settings) -> Result<(Session, Confi
 /// reference has several.
 pub(super) fn image(
     session: &mut Session,
+    world: &World,
     settings: &Settings,
     config: &Config,
     number: u32,
@@ -188,8 +189,9 @@ pub(super) fn image(
     let channel = |c: usize| sum.iter().skip(c).step_by(4).map(|s| (s / f64::from(chunks)) as f32).collect();
     let [width, height] = settings.extent;
     let mut channels: Vec<_> = ["R", "G", "B", "A"].iter().enumerate().map(|(c, n)| (n.to_string(), channel(c))).collect();
+    let directions = sample_directions(world, config);
     for aov in &settings.aovs {
-        channels.extend(aov.read(session, settings.samples_per_side, config.directions)?);
+        channels.extend(aov.read(session, settings.samples_per_side, &directions)?);
     }
     Ok(LinearImage { width, height, channels })
 }
@@ -205,6 +207,15 @@ pub(super) fn pixels(session: &mut Session, config: &Config) -> Result<Pixels> {
     let (ids, ..) = session.image("ids")?;
     let covered = ids.chunks_exact(4).filter(|id| id.iter().any(|byte| *byte != 0)).count() as u64;
     Ok(Pixels { covered, shaded, by_level })
+}
+
+/// Directions of a sample that stands for a cell of a level, in levels over a sample.
+fn sample_directions(world: &World, config: &Config) -> impl Fn(u32) -> u32 {
+    let area_lights = world.lights.iter().filter(|l| l.is_area()).count() as u32;
+    let shines = world.environment.as_ref().is_some_and(|e| e.intensity > 0.0);
+    let directions = Directions::of(config, shines, area_lights);
+    let config = config.clone();
+    move |level| directions.at(level, &config).total(area_lights)
 }
 
 /// Statistics of the session's last frame and of the times of some.
@@ -228,9 +239,8 @@ pub(super) fn report(
     timings: &[FrameTimings],
     pixels: Pixels,
 ) -> Stats {
-    let area_lights = world.lights.iter().filter(|l| l.is_area()).count() as u32;
-    let shines = world.environment.as_ref().is_some_and(|e| e.intensity > 0.0);
-    let taken = pixels.shaded * u64::from(Directions::of(config, shines, area_lights).total(area_lights));
+    let (directions, pixel) = (sample_directions(world, config), config.samples_per_side.ilog2() as i32);
+    let taken = pixels.by_level.iter().map(|(level, n)| n * u64::from(directions((level + pixel) as u32))).sum();
     let estimator = match config.estimator {
         Estimator::Mis => "mis",
         Estimator::Brdf => "brdf",

@@ -151,7 +151,7 @@ impl Bandwidth {
             let constants = [operator, combine, u32::from(config.widened()), lights];
             ComputePipeline::new(p.build, p.modules, &INTERFACE, p.bridge, p.slots, &constants)
         };
-        let rate = config.samples_per_cycle.unwrap_or(samples_per_cycle(config.directions) as f32);
+        let rate = config.samples_per_cycle.unwrap_or(samples_per_cycle(config.directions_a_pixel()) as f32);
         let push = Push {
             side: config.block_side() as i32,
             probes: config.probes as i32,

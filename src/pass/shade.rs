@@ -43,6 +43,7 @@ pub const INTERFACE: Interface = Interface {
 #[repr(C)]
 #[derive(Clone, Copy, Pod, Zeroable)]
 struct Push {
+    /// Of a sample that stands for a pixel or more.
     brdf_samples: u32,
     environment_samples: u32,
     light_samples: u32,
@@ -82,7 +83,7 @@ impl Shade {
             Estimator::Lookup => 3,
         };
         let mut make = |lights| {
-            let constants = [constant, lights, u32::from(levelled), u32::from(config.widened())];
+            let constants = [constant, lights, u32::from(levelled), u32::from(config.widened()), config.sharing_levels()];
             ComputePipeline::new(p.build, p.modules, &INTERFACE, p.bridge, p.slots, &constants)
         };
         Ok(Self([make(0)?, make(1)?]))

@@ -102,7 +102,7 @@ impl<'a> Twin<'a> {
 
     /// `None` where nothing is covered.
     pub fn block(&self, frame: &Frame, config: &Config, block: usize, seed: u32) -> Option<Predicted> {
-        let side = config.samples_per_side.max(2) as usize;
+        let side = 2 * config.samples_per_side as usize;
         let covered = frame.samples(block, side).filter(|(p, _)| frame.ids[*p] != 0);
         let at = covered.min_by_key(|(_, off)| *off)?.0;
         let [width, height] = frame.extent.map(|e| e as f64);
