@@ -1,6 +1,6 @@
 #version 460
-// Reflected radiance of listed samples by N directions each (Bagher 2011, equations 1 and 2, section 3.3): half from the
-// reflectance, half from the environment, combined by the balance heuristic; or all from the reflectance.
+// Reflected radiance of listed samples by N directions each, the same number or one of their own (Bagher 2011, equations 1 and 2,
+// sections 2.3 and 3.3): half from the reflectance, half from the environment, combined by the balance heuristic; or all from the reflectance.
 // Whether the filter widens lobes.
 layout(constant_id = 3) const bool KERNEL = false;
 #define MATERIAL_KERNEL KERNEL
@@ -26,13 +26,15 @@ const uint ESTIMATOR_LOOKUP = 3u;
 layout(constant_id = 1) const bool LOCAL_LIGHTS = false;
 // Whether entries are samples that stand for cells of some level, or all samples.
 layout(constant_id = 2) const bool LEVELLED = false;
+// Whether entries carry a number of directions.
+layout(constant_id = 4) const bool ALLOCATED = false;
 
 layout(set = 2, binding = 3, std430) readonly buffer Arguments {
     uint groups_x, groups_y, groups_z;
     uint count;
 } arguments;
 layout(set = 2, binding = 4, std430) readonly buffer List {
-    uint list[];
+    uint list[]; // entries; with a number of directions behind each if ALLOCATED
 };
 layout(set = 2, binding = 5, rgba32f) uniform writeonly image2D radiance;
 layout(set = 2, binding = 6, std430) readonly buffer Lights {
@@ -44,10 +46,32 @@ layout(set = 2, binding = 8) uniform sampler2D normals;  // as the filter pass w
 layout(set = 2, binding = 9) uniform usampler2D factors;
 
 layout(push_constant) uniform Push {
-    uint brdf_samples;
+    uint brdf_samples; // as Directions::split of src/plan.rs shares them out; if ALLOCATED, each entry's own number is
     uint environment_samples;
     uint light_samples; // for each area light
 } push;
+
+// Of the sample.
+uint brdf_samples;
+uint environment_samples;
+uint light_samples;
+
+// Directions::split of src/plan.rs: half from the reflectance; the other half in equal parts from the environment and each area
+// light, as far as there are any.
+void split(uint n) {
+    uint area = LOCAL_LIGHTS ? frame.lights.y : 0u;
+    uint sources = area + (push.environment_samples > 0u ? 1u : 0u);
+    if (ESTIMATOR != ESTIMATOR_MIS || sources == 0u) {
+        brdf_samples = n;
+        environment_samples = 0u;
+        light_samples = 0u;
+        return;
+    }
+    uint other = n / 2u;
+    light_samples = area > 0u ? max(other / sources, 1u) : 0u;
+    brdf_samples = n - other;
+    environment_samples = push.environment_samples > 0u ? uint(max(int(other) - int(light_samples * area), 1)) : 0u;
+}
 
 // Contribution of a direction drawn from the reflectance, seen from world point p. The environment and every area light
 // weigh it against their own samples (balance heuristic, one light at a time: lights add up).
@@ -64,12 +88,12 @@ vec3 brdf_contribution(Local f, Material m, vec3 p, uvec2 u) {
     float jacobian = 0.25 / cos_d;
     bool alone = ESTIMATOR != ESTIMATOR_MIS;
     float weight_density = alone ? h.w : material_density(m, h.xyz);
-    float brdf = float(push.brdf_samples) * weight_density * jacobian;
-    float environment = alone ? 0.0 : float(push.environment_samples) * environment_per_steradian(light.a, length(w.xz));
+    float brdf = float(brdf_samples) * weight_density * jacobian;
+    float environment = alone ? 0.0 : float(environment_samples) * environment_per_steradian(light.a, length(w.xz));
     vec3 sum = light.rgb / (brdf + environment);
     for (uint i = 0u; LOCAL_LIGHTS && i < frame.lights.y; ++i) {
         float density = light_density(lights[frame.lights.x + i], p, w);
-        float competing = alone ? 0.0 : float(push.light_samples) * density;
+        float competing = alone ? 0.0 : float(light_samples) * density;
         sum += density > 0.0 ? lights[frame.lights.x + i].power.rgb / (brdf + competing) : vec3(0.0);
     }
     return value * sum * (weight_density / h.w);
@@ -86,8 +110,8 @@ vec3 environment_contribution(Local f, Material m, uvec2 u) {
     wi = above ? wi : vec3(0.0, 0.0, 1.0);
     vec4 light = environment_fetch(uv);
     vec3 h = normalize(wi + f.view);
-    float environment = float(push.environment_samples) * environment_per_steradian(light.a, w.w);
-    float brdf = float(push.brdf_samples) * material_density(m, h) * 0.25 / dot(f.view, h);
+    float environment = float(environment_samples) * environment_per_steradian(light.a, w.w);
+    float brdf = float(brdf_samples) * material_density(m, h) * 0.25 / dot(f.view, h);
     vec3 value = material_evaluate(m, wi, f.view, h) * light.rgb * wi.z / (brdf + environment);
     return above ? value : vec3(0.0);
 }
@@ -101,8 +125,8 @@ vec3 light_contribution(Local f, Material m, vec3 p, LightRecord light, uvec2 u)
         return vec3(0.0);
     }
     vec3 h = normalize(wi + f.view);
-    float brdf = float(push.brdf_samples) * material_density(m, h) * 0.25 / dot(f.view, h);
-    return material_evaluate(m, wi, f.view, h) * light.power.rgb * wi.z / (brdf + float(push.light_samples) * density);
+    float brdf = float(brdf_samples) * material_density(m, h) * 0.25 / dot(f.view, h);
+    return material_evaluate(m, wi, f.view, h) * light.power.rgb * wi.z / (brdf + float(light_samples) * density);
 }
 
 // What the exact lights add.
@@ -140,7 +164,14 @@ void main() {
     if (index >= arguments.count) {
         return;
     }
-    uint entry = list[index];
+    uint entry = list[ALLOCATED ? 2u * index : index];
+    if (ALLOCATED) {
+        split(list[2u * index + 1u]);
+    } else {
+        brdf_samples = push.brdf_samples;
+        environment_samples = push.environment_samples;
+        light_samples = push.light_samples;
+    }
     ivec2 p = LEVELLED ? list_sample(entry) : ivec2(entry & 0xffffu, entry >> 16);
     int l = LEVELLED ? list_level(entry) : 0;
     vec3 ray = frame_ray(p);
@@ -153,24 +184,24 @@ void main() {
     uint seed = hash((uint(p.y) << 16 | uint(p.x)) ^ hash(frame.sampling.x ^ hash(frame.sampling.y)));
     vec3 sum = vec3(0.0);
     if (ESTIMATOR == ESTIMATOR_LOOKUP) {
-        for (uint i = 0u; i < push.brdf_samples; ++i) {
+        for (uint i = 0u; i < brdf_samples; ++i) {
             sum += lookup(f, m, hash(seed + i));
         }
         store(p, l, sum);
         return;
     }
     uvec2 seeds = sobol_seeds(seed);
-    for (uint i = 0u; i < push.brdf_samples; ++i) {
+    for (uint i = 0u; i < brdf_samples; ++i) {
         sum += brdf_contribution(f, m, at, ESTIMATOR == ESTIMATOR_BRDF_RANDOM ? random_point(i, seed) : sobol_point(i, seeds));
     }
     if (ESTIMATOR == ESTIMATOR_MIS) {
         seeds = sobol_seeds(seed + 1u);
-        for (uint i = 0u; i < push.environment_samples; ++i) {
+        for (uint i = 0u; i < environment_samples; ++i) {
             sum += environment_contribution(f, m, sobol_point(i, seeds));
         }
         for (uint k = 0u; LOCAL_LIGHTS && k < frame.lights.y; ++k) {
             seeds = sobol_seeds(seed + 2u + k);
-            for (uint i = 0u; i < push.light_samples; ++i) {
+            for (uint i = 0u; i < light_samples; ++i) {
                 sum += light_contribution(f, m, at, lights[frame.lights.x + k], sobol_point(i, seeds));
             }
         }

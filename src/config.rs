@@ -1,6 +1,7 @@
 //! What a renderer is built for. Everything here is fixed until [`crate::Renderer::resize`] or a new renderer.
 
 use crate::error::{Error, Result};
+use crate::frequency::allocation::Allocation;
 use crate::frequency::operators::{Combine, Operator};
 use crate::gpu::pipeline::Modules;
 use ash::vk;
@@ -92,6 +93,9 @@ pub struct Config {
     pub geometric: bool,
     /// Directions a shaded sample, 1 to 65536; at least 2 for [`Estimator::Mis`].
     pub directions: u32,
+    /// How shaded samples share them. All but [`Allocation::Constant`] need [`Rate::Bandwidth`], whose prediction they go by, and
+    /// levels above a sample; `directions` is the mean then.
+    pub allocation: Allocation,
     /// Whether the curvature pass runs (an output of its own until something in the frame reads it).
     pub curvature: bool,
     /// Where the G-buffer comes from.
@@ -117,6 +121,7 @@ impl Config {
             filter: Filter::default(),
             geometric: false,
             directions: 64,
+            allocation: Allocation::default(),
             curvature: false,
             gbuffer: GBufferSource::default(),
             modules: Modules::default(),
@@ -174,6 +179,24 @@ impl Config {
         let rate = self.samples_per_cycle.unwrap_or(1.0);
         check(rate > 0.0 && rate.is_finite(), "samples_per_cycle", "a finite number > 0", rate.to_string())?;
         let least = if self.estimator == Estimator::Mis { 2 } else { 1 };
-        check((least..=65536).contains(&self.directions), "directions", &format!("{least} to 65536"), self.directions.to_string())
+        check(
+            (least..=65536).contains(&self.directions),
+            "directions",
+            &format!("{least} to 65536"),
+            self.directions.to_string(),
+        )?;
+        let weighed = self.allocation != Allocation::Constant;
+        check(
+            !weighed || self.rate == Rate::Bandwidth,
+            "allocation",
+            "constant, unless the rate is bandwidth",
+            format!("{} at the rate {:?}", self.allocation.name(), self.rate),
+        )?;
+        check(
+            !weighed || self.coarsest() > 0,
+            "lmax",
+            "at least 1, unless directions are constant",
+            format!("{} with {}", self.lmax, self.allocation.name()),
+        )
     }
 }

@@ -2,11 +2,12 @@
 
 use crate::config::{Config, GBufferSource, Rate};
 use crate::error::Result;
+use crate::frequency::allocation::Allocation;
 use crate::gpu::pipeline::BridgeLayouts;
 use crate::gpu::retire::{Build, Retired};
 use crate::pass::gbuffer::GBuffer;
 use crate::pass::{
-    PassContext, bandwidth, classify, curvature, environment_bandwidth, pyramid, resolve, shade, tonemap, upsample,
+    PassContext, allocate, bandwidth, classify, curvature, environment_bandwidth, pyramid, resolve, shade, tonemap, upsample,
 };
 use ash::vk;
 
@@ -18,6 +19,7 @@ pub(crate) struct Passes {
     pub bandwidth: Option<bandwidth::Bandwidth>,
     pub pyramid: Option<pyramid::Pyramid>,
     pub classify: classify::Classify,
+    pub allocate: Option<allocate::Allocate>,
     pub shade: shade::Shade,
     pub upsample: Option<upsample::Upsample>,
     pub resolve: resolve::Resolve,
@@ -41,6 +43,7 @@ impl Passes {
             bandwidth: predicted.then(|| bandwidth::Bandwidth::new(&mut p, config)).transpose()?,
             pyramid: (top > 0).then(|| pyramid::Pyramid::new(&mut p, top)).transpose()?,
             classify: classify::Classify::new(&mut p, top, predicted)?,
+            allocate: (config.allocation != Allocation::Constant).then(|| allocate::Allocate::new(&mut p, config)).transpose()?,
             shade: shade::Shade::new(&mut p, config, top > 0)?,
             upsample: (top > 0).then(|| upsample::Upsample::new(&mut p, top)).transpose()?,
             resolve: resolve::Resolve::new(&mut p)?,
@@ -65,6 +68,9 @@ impl Passes {
             pass.retire(bag);
         }
         self.classify.retire(bag);
+        if let Some(pass) = self.allocate {
+            pass.retire(bag);
+        }
         self.shade.retire(bag);
         if let Some(pass) = self.upsample {
             pass.retire(bag);

@@ -7,6 +7,7 @@ use crate::gpu::image::Image;
 use crate::gpu::memory::Location;
 use crate::gpu::recorder::States;
 use crate::gpu::retire::{Build, Retired};
+use crate::pass::allocate::AllocationBuffers;
 use crate::pass::bandwidth::FORECAST_BYTES;
 use crate::pass::gbuffer::GBufferImages;
 use crate::pass::pyramid::Cells;
@@ -34,6 +35,7 @@ pub(crate) struct Targets {
     pub arguments: Buffer,
     /// Samples to shade.
     pub list: Buffer,
+    pub allocation: Option<AllocationBuffers>,
 }
 
 /// Buffers over the cells of levels above the samples.
@@ -91,6 +93,7 @@ impl Targets {
             odd: plan.odd.map(|desc| Image::new(build, desc)).transpose()?,
             resolved: Image::new(build, plan.resolved)?,
             arguments: Buffer::new(build, "arguments", ARGUMENT_BYTES, arguments, Location::Device)?,
+            allocation: plan.allocated.then(|| AllocationBuffers::new(build, plan.allocation_buffers())).transpose()?,
             list: Buffer::new(build, "list", plan.list_bytes(), storage | source, Location::Device)?,
             plan,
         })
@@ -118,7 +121,7 @@ impl Targets {
             "blocks" => cells.map(|c| &c.blocks),
             "weights" => cells.map(|c| &c.weights),
             "block arguments" => cells.map(|c| &c.arguments),
-            _ => None,
+            _ => self.allocation.as_ref().and_then(|a| a.buffer(name)),
         }
     }
 
@@ -130,7 +133,9 @@ impl Targets {
             image.retire(bag);
         }
         let cells = self.cells.map(|c| [c.cells, c.blocks, c.weights, c.arguments]);
-        for buffer in cells.into_iter().flatten().chain(self.forecast).chain([self.arguments, self.list]) {
+        let shared = self.allocation.map(AllocationBuffers::into_buffers);
+        let all = cells.into_iter().flatten().chain(self.forecast).chain(shared.into_iter().flatten());
+        for buffer in all.chain([self.arguments, self.list]) {
             states.forget(buffer.handle);
             buffer.retire(bag);
         }

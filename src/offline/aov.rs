@@ -1,5 +1,6 @@
 //! Layers beside radiance: what the frame's own images hold, at one shading sample an output pixel.
 
+use crate::Config;
 use crate::offline::error::{Error, Result};
 use crate::offline::levels;
 use crate::offline::session::Session;
@@ -115,11 +116,12 @@ impl Aov {
         self == Self::Curvature
     }
 
-    /// The layer's channels after a frame of `side` samples a side and `directions` a sample.
+    /// The layer's channels after a frame of `config`.
     ///
     /// # Errors
     /// The device's, on read-back.
-    pub fn read(self, session: &mut Session, side: u32, directions: u32) -> Result<Vec<Channel>> {
+    pub fn read(self, session: &mut Session, config: &Config) -> Result<Vec<Channel>> {
+        let side = config.samples_per_side;
         let name = ALL.iter().find(|(_, a)| *a == self).map_or("", |(n, _)| n);
         let covered = Pixels::read(session, "ids", side)?;
         let mask = covered.map(|t| if t[0] == 0 { 0.0 } else { 1.0 });
@@ -164,7 +166,7 @@ impl Aov {
             }
             Self::Shaded | Self::Samples => {
                 let mut shaded = vec![0; covered.words.len()];
-                for ([x, y], _) in levels::shaded(session)? {
+                for ([x, y], directions) in levels::directions(session, config)? {
                     shaded[y as usize * covered.width + x as usize] = if self == Self::Shaded { 1 } else { directions };
                 }
                 scalar(covered.of(shaded).map(|t| t[0] as f32))

@@ -1,5 +1,6 @@
 //! A still image of a world, with its layers and statistics.
 
+use crate::frequency::allocation::Allocation;
 use crate::frequency::operators::{Combine, Operator};
 use crate::gpu::timer::FrameTimings;
 use crate::offline::aov::Aov;
@@ -11,7 +12,6 @@ use crate::offline::rates::Rate;
 use crate::offline::session::Session;
 use crate::offline::stats::{Pixels, Quantiles, Samples, Stats, pass_times};
 use crate::offline::world::World;
-use crate::plan::Directions;
 use crate::{Config, Estimator, Filter, Requirements};
 use serde_json::json;
 use std::collections::BTreeMap;
@@ -46,6 +46,8 @@ pub struct Settings {
     pub geometric: bool,
     /// Directions a shaded sample.
     pub samples: u32,
+    /// How shaded samples share them; `samples` is the mean.
+    pub allocation: Allocation,
     /// Estimator.
     pub estimator: Estimator,
     /// Shading samples a side of a pixel.
@@ -77,6 +79,7 @@ impl Settings {
             filter: base.filter,
             geometric: base.geometric,
             samples: base.directions,
+            allocation: base.allocation,
             estimator: base.estimator,
             samples_per_side: base.samples_per_side,
             seed: 0,
@@ -106,6 +109,7 @@ impl Settings {
             filter: self.filter,
             geometric: self.geometric,
             directions: self.reference.map_or(self.samples, |n| n.min(REFERENCE_CHUNK)),
+            allocation: if self.reference.is_some() { Allocation::Constant } else { self.allocation },
             curvature: self.aovs.iter().any(|a| a.needs_curvature()),
             ..base
         }
@@ -148,7 +152,7 @@ pub fn render(world: &World, settings: &Settings, progress: &mut dyn FnMut(u32, 
     let [width, height] = settings.extent;
     let mut channels: Vec<_> = ["R", "G", "B", "A"].iter().enumerate().map(|(c, n)| (n.to_string(), channel(c))).collect();
     for aov in &settings.aovs {
-        channels.extend(aov.read(&mut session, settings.samples_per_side, config.directions)?);
+        channels.extend(aov.read(&mut session, &config)?);
     }
 
     // A frame's times arrive when its slot is recorded again.
@@ -178,12 +182,10 @@ pub(crate) fn statistics(
     for (_, level) in levels::shaded(session)? {
         *by_level.entry(level as i32 - pixel).or_insert(0) += 1;
     }
-    let shaded = by_level.values().sum();
+    let shaded: u64 = by_level.values().sum();
     let (ids, ..) = session.image("ids")?;
     let covered = ids.chunks_exact(4).filter(|id| id.iter().any(|byte| *byte != 0)).count() as u64;
-    let area_lights = world.lights.iter().filter(|l| l.is_area()).count() as u32;
-    let shines = world.environment.as_ref().is_some_and(|e| e.intensity > 0.0);
-    let taken = shaded * u64::from(Directions::of(config, shines, area_lights).total(area_lights));
+    let taken = levels::directions(session, config)?.iter().map(|(_, n)| u64::from(*n)).sum();
     let estimator = match config.estimator {
         Estimator::Mis => "mis",
         Estimator::Brdf => "brdf",
@@ -201,6 +203,7 @@ pub(crate) fn statistics(
         ("geometric", json!(config.geometric)),
         ("estimator", json!(estimator)),
         ("samples", json!(config.directions)),
+        ("np_rule", json!(config.allocation.name())),
         ("aa", json!(config.samples_per_side.pow(2))),
         ("seed", json!(settings.seed)),
         ("reference", json!(settings.reference)),
@@ -212,7 +215,7 @@ pub(crate) fn statistics(
         extent: settings.extent,
         settings: values,
         pixels: Pixels { covered, shaded, by_level },
-        samples: Samples { taken, budget: taken },
+        samples: Samples { taken, budget: shaded * u64::from(config.directions) },
         passes: pass_times(timings, session.pass_bytes()),
         frame_ms: Quantiles::of(timings.iter().map(|t| t.span_ms).collect()),
         setup_ms: session.setup().iter().copied().collect(),

@@ -3,6 +3,7 @@
 
 use crate::config::Config;
 use crate::error::Result;
+use crate::frequency::allocation::Allocation;
 use crate::frequency::level::samples_per_cycle;
 use crate::frequency::operators::{Combine, Operator};
 use crate::gpu::access::Access;
@@ -53,6 +54,8 @@ struct Push {
     stride: i32,
     /// Groups across of the list of all samples, which only the forecast writes: extents change without the pass.
     full: u32,
+    /// Of this frame's environment.
+    dark: f32,
 }
 
 /// One block in so many a side is looked at first.
@@ -83,8 +86,10 @@ pub(crate) struct Io<'a> {
     pub light_count: u32,
     /// Out: the level of each sample, in levels over a sample; 0 where all samples are shaded.
     pub level: &'a Image,
-    /// Out: of each block, bandwidth in cycles/sample and the integrand's relative standard deviation; 0 where all
-    /// samples are shaded.
+    /// Radiance; less counts as this where directions are shared out by relative deviation.
+    pub dark: f32,
+    /// Out: of each block, bandwidth in cycles/sample, the integrand's relative standard deviation and the logarithm to base 2 of
+    /// the weight by which directions are shared out; 0 where all samples are shaded alike.
     pub prediction: &'a Image,
     /// Out: which of the next passes run.
     pub forecast: &'a Buffer,
@@ -108,8 +113,14 @@ impl Bandwidth {
             Combine::Max => 1,
             Combine::Literal => 2,
         };
+        let allocation = match config.allocation {
+            Allocation::Constant => 0,
+            Allocation::Equation8 => 1,
+            Allocation::Deviation => 2,
+            Allocation::RelativeDeviation => 3,
+        };
         let mut make = |lights| {
-            let constants = [operator, combine, u32::from(config.widened()), lights];
+            let constants = [operator, combine, u32::from(config.widened()), lights, allocation];
             ComputePipeline::new(p.build, p.modules, &INTERFACE, p.bridge, p.slots, &constants)
         };
         let rate = config.samples_per_cycle.unwrap_or(samples_per_cycle(config.directions) as f32);
@@ -120,6 +131,7 @@ impl Bandwidth {
             coarsest: config.coarsest() as i32,
             stride: 1,
             full: 0,
+            dark: 0.0,
         };
         Ok(Self { pipelines: [make(0)?, make(1)?], push })
     }
@@ -164,7 +176,7 @@ impl Bandwidth {
             rec,
             io.bridge,
             &resources,
-            &Push { stride: STRIDE as i32, full: groups(io.level.extent(), 8)[0], ..self.push },
+            &Push { stride: STRIDE as i32, full: groups(io.level.extent(), 8)[0], dark: io.dark, ..self.push },
         );
         pipeline.dispatch(rec, groups(io.prediction.extent(), STRIDE));
         // Where many samples are to be shaded, nothing follows: finding the others would take longer than they do.
@@ -175,7 +187,7 @@ impl Bandwidth {
         // To the validation layer every dispatch of the module writes all that it binds.
         rec.buffer(io.forecast, Access::COMPUTE_ATOMIC);
         rec.flush();
-        pipeline.push(rec, &self.push);
+        pipeline.push(rec, &Push { dark: io.dark, ..self.push });
         pipeline.dispatch_indirect(rec, io.forecast, 0);
         rec.end();
     }

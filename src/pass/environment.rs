@@ -28,6 +28,8 @@ pub(crate) struct EnvironmentImages {
     /// R32F: cycles/radian around each direction, one value a 2x2 block of the map that is analysed; looked up with the map's
     /// own coordinates, nearest. None unless the frame predicts bandwidth.
     pub bandwidth: Option<Image>,
+    /// Mean luminance over the sphere.
+    pub mean: f64,
 }
 
 /// Created and filled, not yet recorded.
@@ -35,6 +37,7 @@ pub(crate) struct EnvironmentUpload {
     map: ImageUpload,
     alias: ImageUpload,
     bandwidth: Option<Work>,
+    mean: f64,
 }
 
 impl EnvironmentUpload {
@@ -62,7 +65,12 @@ impl EnvironmentUpload {
             desc("environment alias", vk::Format::R32G32B32A32_UINT, [SLOTS_A_ROW, slots.len() as u32 / SLOTS_A_ROW]);
         let upload = ImageUpload::new(build, radiance_desc, bytemuck::cast_slice(&radiance))?;
         let bandwidth = bandwidth.map(|pass| pass.prepare(build, samplers, map, &upload.image)).transpose()?;
-        Ok(Self { map: upload, alias: ImageUpload::new(build, alias_desc, bytemuck::cast_slice(&slots))?, bandwidth })
+        Ok(Self {
+            map: upload,
+            alias: ImageUpload::new(build, alias_desc, bytemuck::cast_slice(&slots))?,
+            bandwidth,
+            mean: map.mean_luminance(),
+        })
     }
 
     /// With the pass that it was created with.
@@ -72,7 +80,7 @@ impl EnvironmentUpload {
         rec.end();
         let io = environment_bandwidth::Io { map: &map };
         let bandwidth = self.bandwidth.zip(pass).map(|(work, pass)| pass.record(rec, &io, work, bag));
-        EnvironmentImages { map, alias, bandwidth }
+        EnvironmentImages { map, alias, bandwidth, mean: self.mean }
     }
 }
 

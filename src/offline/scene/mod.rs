@@ -1,5 +1,6 @@
 //! Scene files: TOML in, a resolved [`World`] out.
 
+use crate::frequency::allocation::Allocation;
 use crate::frequency::operators::{Combine, Operator};
 use crate::offline::error::{At, Error, Result};
 use crate::offline::input;
@@ -108,6 +109,18 @@ impl Scene {
             Some("max") => Combine::Max,
             _ => Combine::default(),
         }
+    }
+
+    /// How shaded samples share directions.
+    pub fn allocation(&self) -> Allocation {
+        let rules = [Allocation::Equation8, Allocation::Deviation, Allocation::RelativeDeviation];
+        let name = self.file.settings.np_rule.as_ref().map(|v| v.get_ref().as_str());
+        rules.into_iter().find(|rule| Some(rule.name()) == name).unwrap_or_default()
+    }
+
+    /// Mean directions of a shaded sample, if the scene asks for a number.
+    pub fn budget(&self) -> Option<u32> {
+        self.file.settings.budget.as_ref().map(|v| *v.get_ref())
     }
 
     /// Whether the mesh's curvature widens lobes, whatever the filter.
