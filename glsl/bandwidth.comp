@@ -58,7 +58,7 @@ layout(push_constant) uniform Push {
     int coarsest;            // level
     int stride;              // 1 for every block; more to forecast from one block of that many a side
     uint full_x;             // groups of the list of all samples
-    float dark;              // radiance: less counts as this where noise is weighed
+    float dark;              // radiance that is added to the mean where noise is weighed against it
 } push;
 
 // Where more than this share of the samples is forecast, all of them are shaded: up-sampling shades a few per cent more than is
@@ -184,7 +184,8 @@ int predict(ivec2 block) {
     }
     float weight = ALLOCATION == ALLOCATION_EQUATION8 ? s.bound : sqrt(variance);
     if (ALLOCATION == ALLOCATION_RELATIVE) {
-        weight = weight > 0.0 ? weight / (s.weights / float(push.probes) + push.dark) : 0.0;
+        float chance = ALLOCATION_CHANCE * mean;
+        weight = mean > 0.0 ? sqrt(variance + chance * chance) / (s.weights / float(push.probes) + push.dark) : 0.0;
     }
     float log_weight = ALLOCATION == ALLOCATION_CONSTANT ? 0.0 : allocation_log(weight);
     imageStore(prediction, block, vec4(min(b, 6e4), min(mean > 0.0 ? sqrt(variance) / mean : 0.0, 6e4), log_weight, 0.0));

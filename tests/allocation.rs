@@ -238,7 +238,8 @@ fn statistics_and_layers_say_what_was_drawn() {
         assert!((samples.taken as f64 / samples.budget as f64 - 1.0).abs() < 0.01, "{samples:?}");
         assert!(drawn.iter().zip(&shaded).all(|(n, s)| (*n > 0.0) == (*s > 0.0)));
         let different: std::collections::BTreeSet<u32> = drawn.iter().map(|n| *n as u32).collect();
-        assert_eq!(different.len() > 2, allocation != Allocation::Constant, "{different:?}");
+        // Some stand for cells of two levels, and so have twice as many.
+        assert_eq!(different.len() > 4, allocation != Allocation::Constant, "{different:?}");
         assert_eq!(rendered.stats.settings["np_rule"], allocation.name());
         assert_eq!(rendered.stats.validation_messages, [""; 0]);
     }

@@ -9,6 +9,8 @@ const int ALLOCATION_EQUATION8 = 1;
 const int ALLOCATION_DEVIATION = 2;
 const int ALLOCATION_RELATIVE = 3;
 
+const float ALLOCATION_CHANCE = 0.5; // relative deviation beside that of the probes, which may agree by chance
+
 const uint ALLOCATION_BINS = 4096u;
 const float ALLOCATION_BINS_AN_OCTAVE = 32.0;
 const float ALLOCATION_SPREAD = 4.0; // bins over which equal weights are spread

@@ -167,7 +167,9 @@ impl Aov {
             Self::Shaded | Self::Samples => {
                 let mut shaded = vec![0; covered.words.len()];
                 for ([x, y], directions) in levels::directions(session, config)? {
-                    shaded[y as usize * covered.width + x as usize] = if self == Self::Shaded { 1 } else { directions };
+                    // A sample may stand for cells of several levels.
+                    let sample = &mut shaded[y as usize * covered.width + x as usize];
+                    *sample = if self == Self::Shaded { 1 } else { *sample + directions };
                 }
                 scalar(covered.of(shaded).map(|t| t[0] as f32))
             }

@@ -86,7 +86,7 @@ pub(crate) struct Io<'a> {
     pub light_count: u32,
     /// Out: the level of each sample, in levels over a sample; 0 where all samples are shaded.
     pub level: &'a Image,
-    /// Radiance; less counts as this where directions are shared out by relative deviation.
+    /// Radiance that is added to the mean where directions are shared out by relative deviation.
     pub dark: f32,
     /// Out: of each block, bandwidth in cycles/sample, the integrand's relative standard deviation and the logarithm to base 2 of
     /// the weight by which directions are shared out; 0 where all samples are shaded alike.
