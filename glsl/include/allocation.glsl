@@ -37,7 +37,7 @@ float allocation_share(uint bin, float scale) {
     return scale + float(bin) / ALLOCATION_BINS_AN_OCTAVE;
 }
 
-// The lower of the two powers of two, within `range`, that samples of a bin get, the upper one, and the part that gets this.
+// Two neighbouring powers of two, within `range`, and how far from the first to the second the directions of a bin are.
 vec3 allocation_powers(float share, vec2 range) {
     float rounded = share + 0.5, lower = floor(rounded);
     vec2 powers = clamp(floor(exp2(clamp(vec2(lower, lower + 1.0), 0.0, 31.0)) + 0.5), range.x, range.y);
@@ -50,10 +50,9 @@ float allocation_expected(float share, vec2 range) {
     return p.x + (p.y - p.x) * p.z;
 }
 
-// Directions of one of them.
+// Directions of one of them: that mean, so that no sample is a large part of the budget off; a power of two in most bins.
 uint allocation_directions(float share, vec2 range, uint entry) {
-    vec3 p = allocation_powers(share, range);
-    return uint(int(to_unit(hash(~entry)) < p.z ? p.y : p.x));
+    return uint(int(floor(allocation_expected(share, range) + to_unit(hash(~entry)))));
 }
 
 #endif

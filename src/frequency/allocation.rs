@@ -41,7 +41,7 @@ pub const MOST: u32 = 1024;
 pub const BINS: usize = 4096;
 /// Bins that double a weight.
 const BINS_AN_OCTAVE: f64 = 32.0;
-/// Bins over which equal weights are spread, so that the one of which only a part is rounded up holds few samples.
+/// Bins over which equal weights are spread, so that the one between two powers of two holds few samples.
 const SPREAD: f64 = 4.0;
 /// The logarithm to base 2 where the bins begin; they end at minus it. No weight at all counts as this.
 pub const NONE: f64 = -64.0;
@@ -84,10 +84,10 @@ impl Allocation {
     }
 }
 
-/// The bin of a weight, by the sample's entry in the list.
+/// The bin of a weight, by the sample's entry in the list; in 32 bits, so that it is the device's.
 pub fn bin(log_weight: f64, entry: u32) -> usize {
-    let spread = SPREAD * sobol::to_unit(sobol::hash(entry));
-    (((log_weight - NONE) * BINS_AN_OCTAVE + spread).floor().max(0.0) as usize).min(BINS - 1)
+    let spread = (SPREAD * sobol::to_unit(sobol::hash(entry))) as f32;
+    (((log_weight as f32 - NONE as f32) * BINS_AN_OCTAVE as f32 + spread).floor().max(0.0) as usize).min(BINS - 1)
 }
 
 /// The fewest and most directions of a sample where the mean is `budget` and half a sample's directions come from `sources` other
@@ -113,9 +113,9 @@ pub fn shares(histogram: &[u32], budget: f64, range: [u32; 2]) -> Vec<f64> {
     (0..histogram.len()).map(|bin| share(bin, high)).collect()
 }
 
-/// The lower of the two powers of two, within `range`, that samples of a bin get, the upper one, and the part that gets this.
-/// Weights spread evenly over their bin and numbers are rounded to the nearest in ratio, so most bins get one power alone; the
-/// mean rises with `share` without steps.
+/// Two neighbouring powers of two, within `range`, and how far from the first to the second the directions of a bin are: none of
+/// the way in most bins, whose numbers are rounded to the nearest in ratio; in the bin of the threshold as far as the threshold is
+/// through it, so that they rise with `share` without steps.
 fn powers(share: f64, range: [u32; 2]) -> ([u32; 2], f64) {
     let rounded = share + 0.5;
     let lower = rounded.floor();
@@ -130,10 +130,10 @@ pub fn expected(share: f64, range: [u32; 2]) -> f64 {
     f64::from(lower) + (f64::from(upper) - f64::from(lower)) * part
 }
 
-/// Directions of one of them, by its entry in the list of samples.
+/// Directions of one of them, by its entry in the list of samples: that mean, so that no sample is a large part of the budget off,
+/// and in most bins a power of two.
 pub fn directions(share: f64, range: [u32; 2], entry: u32) -> u32 {
-    let ([lower, upper], part) = powers(share, range);
-    if sobol::to_unit(sobol::hash(!entry)) < part { upper } else { lower }
+    (expected(share, range) + sobol::to_unit(sobol::hash(!entry))).floor() as u32
 }
 
 #[cfg(test)]
