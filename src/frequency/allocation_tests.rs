@@ -73,7 +73,7 @@ fn sources_get_a_direction_each_where_the_budget_has_them() {
     assert_eq!(range(64, 1), [4, 1024]);
     assert_eq!(range(64, 9), [18, 1024]);
     assert_eq!(range(64, 100), [64, 1024]);
-    assert_eq!((range(2, 1), range(2000, 1)), ([2, 2000], [4, 2000]));
+    assert_eq!((range(2, 1), range(2000, 1)), ([2, 1024], [4, 2000]));
 }
 
 /// A lobe of `width` radians that reflects `albedo` under light that varies as fast as `light` cycles/radian.
