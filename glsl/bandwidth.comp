@@ -17,6 +17,7 @@ layout(constant_id = 2) const bool KERNEL = false;
 #include "forecast.glsl"
 #include "list.glsl"
 #include "texture_bandwidth.glsl"
+#include "allocation.glsl"
 
 layout(local_size_x = LIST_GROUP) in;
 
@@ -28,13 +29,16 @@ const int COMBINE_MAX = 1;
 const int COMBINE_LITERAL = 2;
 // Whether the frame has lights beside the environment.
 layout(constant_id = 3) const bool LOCAL_LIGHTS = false;
+// What directions are shared out by, in the order of src/frequency/allocation.rs.
+layout(constant_id = 4) const int ALLOCATION = ALLOCATION_CONSTANT;
 
 layout(set = 2, binding = 4) uniform usampler2D factors;
 layout(set = 2, binding = 5) uniform sampler2D environment_bandwidth; // cycles/radian
 layout(set = 2, binding = 6) uniform sampler2D lobe_bandwidths;       // cycles/radian
 layout(set = 2, binding = 7, r32ui) uniform writeonly uimage2D level; // of each sample, in levels over a sample
 layout(set = 2, binding = 8, rgba16f) uniform writeonly image2D prediction; // of each block: cycles/sample; standard deviation of the
-                                                                           // integrand over its mean
+                                                                           // integrand over its mean; logarithm of the weight
+                                                                           // by which directions are shared out
 layout(set = 2, binding = 9, std430) readonly buffer Lights {
     LightRecord lights[]; // exact ones first
 };
@@ -57,6 +61,7 @@ layout(push_constant) uniform Push {
     int coarsest;            // level
     uint early;              // 1 to forecast from the blocks that are looked at first, writing nothing else
     uint all;                // where the list of all blocks begins
+    float dark;              // radiance that is added to the mean where noise is weighed against it
 } push;
 
 // Where more than this share of the samples is forecast, all of them are shaded: up-sampling shades a few per cent more than is
@@ -76,6 +81,7 @@ struct Sums {
     float radiance;
     float greatest;
     float squares;   // of the weights
+    float bound;     // equation 8's, on the variance
 };
 
 // What a direction reflects, and one over the density that it was drawn with.
@@ -112,7 +118,7 @@ int predict(uint entry) {
     vec2 plane = ((vec2(at) + 0.5) / vec2(extent) * 2.0 - 1.0) * frame.ray.xy + frame.ray.zw;
     float angle = pixel_angle(plane, abs(frame.ray.xy) * 2.0 / vec2(extent));
 
-    Sums s = Sums(0.0, 0.0, 0.0, 0.0, 0.0);
+    Sums s = Sums(0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
     uvec2 seeds = sobol_seeds(hash(uint(block.y) << 16 | uint(block.x)) ^ frame.sampling.x);
     for (int i = 0; i < push.probes; ++i) {
         vec4 h = material_sample(m, sobol_point(uint(i), seeds));
@@ -124,11 +130,12 @@ int predict(uint entry) {
         vec2 uv = latlong_uv(to_world(f, wi));
         uv.x -= frame.environment.x;
         float radiance = luminance(environment_fetch(uv).rgb);
-        float reflected = luminance(material_evaluate(m, wi, f.view, h.xyz)) * wi.z;
+        float reflectance = luminance(material_evaluate(m, wi, f.view, h.xyz)), reflected = reflectance * wi.z;
         float light = textureLod(environment_bandwidth, uv, 0.0).x;
         float lobe = texelFetch(lobe_bandwidths, lobe_bandwidth_texel(int(id), wi, f.view), 0).x * m.sharpness;
         float b = image_bandwidth(OPERATOR, light, lobe, curvatures, distance, f.view.z, angle);
         add(s, b, above ? radiance : 0.0, above ? reflected : 0.0, 4.0 * cos_d / h.w);
+        s.bound += above ? (light + lobe) * (radiance * reflectance) * (radiance * reflectance) : 0.0;
     }
     float mean = s.weights / float(push.probes);
     float variance = max(s.squares / float(push.probes) - mean * mean, 0.0);
@@ -164,7 +171,13 @@ int predict(uint entry) {
     if (push.early == 1u) {
         return found;
     }
-    imageStore(prediction, block, vec4(min(b, 6e4), min(mean > 0.0 ? sqrt(variance) / mean : 0.0, 6e4), 0.0, 0.0));
+    float weight = ALLOCATION == ALLOCATION_EQUATION8 ? s.bound : sqrt(variance);
+    if (ALLOCATION == ALLOCATION_RELATIVE) {
+        float chance = ALLOCATION_CHANCE * mean;
+        weight = mean > 0.0 ? sqrt(variance + chance * chance) / (s.weights / float(push.probes) + push.dark) : 0.0;
+    }
+    float log_weight = ALLOCATION == ALLOCATION_CONSTANT ? 0.0 : allocation_log(weight);
+    imageStore(prediction, block, vec4(min(b, 6e4), min(mean > 0.0 ? sqrt(variance) / mean : 0.0, 6e4), log_weight, 0.0));
     for (k = 0; k < push.side * push.side; ++k) {
         ivec2 p = first + ivec2(k % push.side, k / push.side);
         if (all(lessThan(p, extent))) {
@@ -176,7 +189,8 @@ int predict(uint entry) {
     return found;
 }
 
-// The last group to come here turns off either the list of all samples or what finds coarser ones.
+// The last group to come here turns off either the list of all samples or what finds coarser ones; directions that are shared out
+// by weights are so in both.
 void decide() {
     memoryBarrierBuffer();
     if (atomicAdd(forecast.groups, 1u) + 1u < gl_NumWorkGroups.x * gl_NumWorkGroups.y) {
@@ -184,7 +198,7 @@ void decide() {
     }
     float shaded = float(atomicAdd(forecast.shaded, 0u)) / 64.0, covered = float(atomicAdd(forecast.covered, 0u));
     if (shaded > FALLBACK * covered) {
-        forecast.blocks_x = 0u;
+        forecast.blocks_x = ALLOCATION == ALLOCATION_CONSTANT ? 0u : forecast.blocks_x;
         forecast.cells_x = 0u;
         forecast.samples_x = STRIPE;
     }

@@ -8,7 +8,7 @@
 
 layout(local_size_x = 8, local_size_y = 8) in;
 
-// Bits of x in an entry of the list: 16, or 14 in a frame that has levels (list_entry of levels.glsl at level 0).
+// Bits of x in an entry of the list: 16, or 14 in a frame that has levels (list_entry of list.glsl at level 0).
 layout(constant_id = 0) const int X_BITS = 16;
 
 layout(set = 2, binding = 1, std430) buffer Arguments {

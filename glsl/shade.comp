@@ -1,6 +1,6 @@
 #version 460
-// Reflected radiance of listed samples by N directions each (Bagher 2011, equations 1 and 2, section 3.3): half from the
-// reflectance, half from the environment, combined by the balance heuristic; or all from the reflectance.
+// Reflected radiance of listed samples by N directions each, the same number or one of their own (Bagher 2011, equations 1 and 2,
+// sections 2.3 and 3.3): half from the reflectance, half from the environment, combined by the balance heuristic; or all from the reflectance.
 // Whether the filter widens lobes.
 layout(constant_id = 3) const bool KERNEL = false;
 #define MATERIAL_KERNEL KERNEL
@@ -28,13 +28,15 @@ layout(constant_id = 1) const bool LOCAL_LIGHTS = false;
 layout(constant_id = 2) const bool LEVELLED = false;
 // So many levels below a pixel's share the pixel's directions.
 layout(constant_id = 4) const int SHARING = 0;
+// Whether entries carry a number of directions.
+layout(constant_id = 5) const bool ALLOCATED = false;
 
 layout(set = 2, binding = 3, std430) readonly buffer Arguments {
     uint groups_x, groups_y, groups_z;
     uint count;
 } arguments;
 layout(set = 2, binding = 4, std430) readonly buffer List {
-    uint list[];
+    uint list[]; // entries; with a number of directions behind each if ALLOCATED
 };
 layout(set = 2, binding = 5, rgba32f) uniform writeonly image2D radiance;
 layout(set = 2, binding = 6, std430) readonly buffer Lights {
@@ -46,7 +48,7 @@ layout(set = 2, binding = 8) uniform sampler2D normals;  // as the filter pass w
 layout(set = 2, binding = 9) uniform usampler2D factors;
 
 layout(push_constant) uniform Push {
-    uint brdf_samples;        // of a sample that stands for a pixel or more
+    uint brdf_samples; // of a sample that stands for a pixel or more, as Directions::split of src/plan.rs shares them out; if ALLOCATED, each entry's own number is
     uint environment_samples;
     uint light_samples; // for each area light
 } push;
@@ -64,6 +66,23 @@ uint share(uint n, int finer) {
 uint turn(ivec2 p, int l, int finer) {
     ivec2 inside = (p >> l) & ((1 << finer) - 1);
     return uint((inside.x & 1) | (inside.y & 1) << 1 | (inside.x & 2) << 1 | (inside.y & 2) << 2);
+}
+
+// Directions::split of src/plan.rs: half from the reflectance; the other half in equal parts from the environment and each area
+// light, as far as there are any.
+void split(uint n) {
+    uint area = LOCAL_LIGHTS ? frame.lights.y : 0u;
+    uint sources = area + (push.environment_samples > 0u ? 1u : 0u);
+    if (ESTIMATOR != ESTIMATOR_MIS || sources == 0u) {
+        brdf_samples = n;
+        environment_samples = 0u;
+        light_samples = 0u;
+        return;
+    }
+    uint other = n / 2u;
+    light_samples = area > 0u ? max(other / sources, 1u) : 0u;
+    brdf_samples = n - other;
+    environment_samples = push.environment_samples > 0u ? uint(max(int(other) - int(light_samples * area), 1)) : 0u;
 }
 
 // Contribution of a direction drawn from the reflectance, seen from world point p. The environment and every area light
@@ -157,12 +176,16 @@ void main() {
     if (index >= arguments.count) {
         return;
     }
-    uint entry = list[index];
+    uint entry = list[ALLOCATED ? 2u * index : index];
+    if (ALLOCATED) {
+        split(list[2u * index + 1u]);
+    } else {
+        brdf_samples = push.brdf_samples;
+        environment_samples = push.environment_samples;
+        light_samples = push.light_samples;
+    }
     ivec2 p = LEVELLED ? list_sample(entry) : ivec2(entry & 0xffffu, entry >> 16);
     int l = LEVELLED ? list_level(entry) : 0;
-    brdf_samples = push.brdf_samples;
-    environment_samples = push.environment_samples;
-    light_samples = push.light_samples;
     uint before = 0u;
     ivec2 whose = p;
     if (SHARING != 0) {

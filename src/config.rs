@@ -1,6 +1,7 @@
 //! What a renderer is built for. Everything here is fixed until [`crate::Renderer::resize`] or a new renderer.
 
 use crate::error::{Error, Result};
+use crate::frequency::allocation::Allocation;
 use crate::frequency::environment::EPS;
 use crate::frequency::luminance::COARSEST;
 use crate::frequency::operators::{Combine, Operator};
@@ -105,6 +106,9 @@ pub struct Config {
     /// samples a pixel, whatever stands for a pixel or more gets [`Config::samples_per_side`] times as many, and each finer level a
     /// quarter of the level above.
     pub directions: u32,
+    /// How shaded samples share them. All but [`Allocation::Constant`] need [`Rate::Bandwidth`], whose prediction they go by, and
+    /// levels above a sample; `directions` is the mean then.
+    pub allocation: Allocation,
     /// Whether the curvature pass runs (an output of its own until something in the frame reads it).
     pub curvature: bool,
     /// Where the G-buffer comes from.
@@ -131,6 +135,7 @@ impl Config {
             filter: Filter::default(),
             geometric: false,
             directions: 64,
+            allocation: Allocation::default(),
             curvature: false,
             gbuffer: GBufferSource::default(),
             modules: Modules::default(),
@@ -150,7 +155,8 @@ impl Config {
     /// Levels below a pixel's that share the pixel's directions. As many a pixel whatever its level make noise the same there,
     /// and edges, where fine samples are needed, cost no more than other pixels.
     pub(crate) fn sharing_levels(&self) -> u32 {
-        if self.rate == Rate::Bandwidth { self.samples_per_side.ilog2() } else { 0 }
+        let shared = self.rate == Rate::Bandwidth && self.allocation == Allocation::Constant;
+        if shared { self.samples_per_side.ilog2() } else { 0 }
     }
 
     /// Directions of a sample that stands for a pixel or more: halfway, in decibels of noise, between those of one sample and of
@@ -209,6 +215,24 @@ impl Config {
         let rate = self.samples_per_cycle.unwrap_or(1.0);
         check(rate > 0.0 && rate.is_finite(), "samples_per_cycle", "a finite number > 0", rate.to_string())?;
         let least = if self.estimator == Estimator::Mis { 2 } else { 1 };
-        check((least..=65536).contains(&self.directions), "directions", &format!("{least} to 65536"), self.directions.to_string())
+        check(
+            (least..=65536).contains(&self.directions),
+            "directions",
+            &format!("{least} to 65536"),
+            self.directions.to_string(),
+        )?;
+        let weighed = self.allocation != Allocation::Constant;
+        check(
+            !weighed || self.rate == Rate::Bandwidth,
+            "allocation",
+            "constant, unless the rate is bandwidth",
+            format!("{} at the rate {:?}", self.allocation.name(), self.rate),
+        )?;
+        check(
+            !weighed || self.coarsest() > 0,
+            "lmax",
+            "at least 1, unless directions are constant",
+            format!("{} with {}", self.lmax, self.allocation.name()),
+        )
     }
 }

@@ -2,12 +2,13 @@
 
 use crate::config::{Config, Estimator, GBufferSource, Rate};
 use crate::error::Result;
+use crate::frequency::allocation::Allocation;
 use crate::gpu::pipeline::BridgeLayouts;
 use crate::gpu::retire::{Build, Retired};
 use crate::pass::gbuffer::GBuffer;
 use crate::pass::{
-    PassContext, bandwidth, base, classify, curvature, environment_bandwidth, luminance, prefilter, pyramid, resolve, shade,
-    tonemap, upsample,
+    PassContext, allocate, bandwidth, base, classify, curvature, environment_bandwidth, luminance, prefilter, pyramid, resolve,
+    shade, tonemap, upsample,
 };
 use ash::vk;
 
@@ -31,6 +32,8 @@ pub(crate) struct Passes {
 /// What draws directions.
 pub(crate) struct Sampled {
     pub classify: classify::Classify,
+    /// Where samples have numbers of directions of their own.
+    pub allocate: Option<allocate::Allocate>,
     pub shade: shade::Shade,
 }
 
@@ -46,7 +49,12 @@ impl Passes {
         let (top, predicted) = (config.coarsest(), config.rate == Rate::Bandwidth);
         let looked_up = config.estimator == Estimator::Preconvolved;
         let sampled = |p: &mut PassContext<'_, '_>| -> Result<Sampled> {
-            Ok(Sampled { classify: classify::Classify::new(p, top, predicted)?, shade: shade::Shade::new(p, config, top > 0)? })
+            let allocated = config.allocation != Allocation::Constant;
+            Ok(Sampled {
+                classify: classify::Classify::new(p, top, predicted)?,
+                allocate: allocated.then(|| allocate::Allocate::new(p, config)).transpose()?,
+                shade: shade::Shade::new(p, config, top > 0)?,
+            })
         };
         Ok(Self {
             environment_bandwidth: predicted
@@ -91,8 +99,11 @@ impl Passes {
         if let Some(pass) = self.base {
             pass.retire(bag);
         }
-        if let Some(Sampled { classify, shade }) = self.sampled {
+        if let Some(Sampled { classify, allocate, shade }) = self.sampled {
             classify.retire(bag);
+            if let Some(pass) = allocate {
+                pass.retire(bag);
+            }
             shade.retire(bag);
         }
         if let Some(pass) = self.upsample {

@@ -1,6 +1,7 @@
 //! The frame's arithmetic: extents, image descriptions, memory footprint. No GPU.
 
 use crate::config::{Config, GBufferSource, MAX_LEVEL, Rate};
+use crate::frequency::allocation::{Allocation, BINS};
 use crate::gpu::image::ImageDesc;
 use crate::light::{LightRecord, MAX_LIGHTS};
 use crate::pass::{bandwidth, luminance};
@@ -21,6 +22,8 @@ pub(crate) struct Plan {
     pub level: Option<ImageDesc>,
     /// What the `bandwidth` pass finds in each block of samples.
     pub prediction: Option<ImageDesc>,
+    /// Whether each sample of the list gets a number of directions of its own.
+    pub allocated: bool,
     /// Linear radiance: of samples, and below them of cells of even levels.
     pub radiance: ImageDesc,
     /// Linear radiance of cells of odd levels, one level below another.
@@ -139,6 +142,7 @@ impl Plan {
                 let blocks = shading.map(|e| e.div_ceil(config.block_side()));
                 image("prediction", vk::Format::R16G16B16A16_SFLOAT, blocks, storage | vk::ImageUsageFlags::TRANSFER_DST)
             }),
+            allocated: config.allocation != Allocation::Constant,
             radiance: values("radiance", shading[0], even_rows),
             odd: (levels.top > 0).then(|| values("odd", shading[0].div_ceil(2), odd_rows)),
             levels,
@@ -173,7 +177,15 @@ impl Plan {
 
     /// The largest storage buffer.
     pub fn largest_buffer(&self) -> u64 {
-        self.cell_buffers().into_iter().map(|(_, bytes)| bytes).fold(self.list_bytes(), u64::max)
+        let all = self.cell_buffers().into_iter().chain(self.allocation_buffers());
+        all.map(|(_, bytes)| bytes).fold(self.list_bytes(), u64::max)
+    }
+
+    /// Name and bytes of the buffers that share directions out, none where all samples get the same.
+    pub fn allocation_buffers(&self) -> [(&'static str, u64); 4] {
+        let bins = if self.allocated { BINS as u64 } else { 0 };
+        let list = if self.allocated { 2 * self.list_bytes() } else { 0 };
+        [("histogram", 4 * bins), ("shares", 8 * bins), ("cursors", 4 * bins), ("allocated", list)]
     }
 
     /// Bytes of the list of samples to shade.
@@ -194,10 +206,15 @@ pub(crate) struct Directions {
 }
 
 impl Directions {
-    /// Of a sample that stands for a pixel or more: half of the number from the reflectance; the other half in equal parts from
-    /// the environment, if it shines, and each of `area_lights`, at least one each.
+    /// As [`Self::split`], of the number of a sample that stands for a pixel or more.
     pub fn of(config: &Config, environment: bool, area_lights: u32) -> Self {
         let n = if config.estimator == crate::Estimator::Preconvolved { 0 } else { config.directions_a_pixel() };
+        Self::split(config, n, environment, area_lights)
+    }
+
+    /// Half of `n` from the reflectance; the other half in equal parts from the environment, if it shines, and each of
+    /// `area_lights`, at least one each. Twin of `split` in `glsl/shade.comp`.
+    pub fn split(config: &Config, n: u32, environment: bool, area_lights: u32) -> Self {
         let sources = u32::from(environment) + area_lights;
         if config.estimator != crate::Estimator::Mis || sources == 0 {
             return Self { brdf: n, environment: 0, light: 0 };
@@ -226,7 +243,8 @@ pub fn memory_footprint(config: &Config) -> Footprint {
     let plan = Plan::of(config);
     let mut rows: Vec<_> = plan.images().map(|d| FootprintRow { name: d.name, bytes: d.bytes() }).collect();
     rows.push(FootprintRow { name: "list", bytes: plan.list_bytes() });
-    rows.extend(plan.cell_buffers().into_iter().filter(|b| b.1 > 0).map(|(name, bytes)| FootprintRow { name, bytes }));
+    let buffers = plan.cell_buffers().into_iter().chain(plan.allocation_buffers());
+    rows.extend(buffers.filter(|b| b.1 > 0).map(|(name, bytes)| FootprintRow { name, bytes }));
     rows.extend(plan.luminance_buffers(config).into_iter().flatten().map(|(name, bytes)| FootprintRow { name, bytes }));
     if let Some(blocks) = plan.prediction {
         let [width, height, _] = blocks.extent;
@@ -324,6 +342,19 @@ mod tests {
         let base = Config { directions: 1, ..Config::new([4, 4]) };
         assert!(base.validate().unwrap_err().to_string().contains("Config::directions"));
         assert!(Config { samples_per_side: 3, ..Config::new([4, 4]) }.validate().is_err());
+        let weighed = Config { allocation: Allocation::Deviation, ..Config::new([4, 4]) };
+        for rate in [Rate::Full, Rate::Uniform(1), Rate::Given] {
+            let said = Config { rate, ..weighed.clone() }.validate().unwrap_err().to_string();
+            assert!(
+                ["Config::allocation", "constant, unless", "sqrt at the rate"].iter().all(|part| said.contains(part)),
+                "{said}"
+            );
+        }
+        let predicted = Config { rate: Rate::Bandwidth, ..weighed };
+        assert!(predicted.validate().is_ok());
+        let fine = Config { lmax: 0, ..predicted.clone() };
+        assert!(fine.validate().unwrap_err().to_string().contains("Config::lmax"));
+        assert!(Config { lmax: 0, samples_per_side: 2, ..predicted }.validate().is_ok());
         assert!(Config { samples_per_side: 4, ..Config::new([16384, 1]) }.validate().is_err());
     }
 }

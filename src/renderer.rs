@@ -3,6 +3,7 @@
 use crate::config::{Config, Estimator, Rate};
 use crate::error::{Error, Result};
 use crate::frame::{FrameInputs, GBufferInput, Output};
+use crate::frequency::allocation::DARK;
 use crate::gpu::access::Access;
 use crate::gpu::buffer::Buffer;
 use crate::gpu::context::{Context, Host};
@@ -18,8 +19,8 @@ use crate::pass::environment::{Analyses, EnvironmentImages, EnvironmentUpload};
 use crate::pass::gbuffer;
 use crate::pass::materials::{MaterialBridge, MaterialImages, MaterialsUpload};
 use crate::pass::{
-    FrameUniform, PassContext, bandwidth, base, classify, curvature, filter, level, luminance, pyramid, resolve, shade, tonemap,
-    upsample,
+    FrameUniform, PassContext, allocate, bandwidth, base, classify, curvature, filter, level, luminance, pyramid, resolve, shade,
+    tonemap, upsample,
 };
 use crate::passes::{Passes, Sampled, layout};
 use crate::plan::{Directions, LIGHT_BYTES};
@@ -247,6 +248,7 @@ impl Renderer {
                         factors,
                         lights,
                         light_count: exact + area,
+                        dark: (DARK * environment.mean * f64::from(inputs.environment.intensity)) as f32,
                         level,
                         prediction,
                         forecast: groups,
@@ -295,13 +297,19 @@ impl Renderer {
         }
 
         let radiance = &targets.radiance;
-        if let Some(Sampled { classify, shade }) = &passes.sampled {
+        if let Some(Sampled { classify, allocate, shade }) = &passes.sampled {
             // 6  Which samples to shade.
             let (arguments, list) = (&targets.arguments, &targets.list);
             classify.record(rec, &classify::Io { frame, bridge, from, arguments, list });
+            let directions = Directions::of(&self.config, inputs.environment.intensity > 0.0, area);
+            let mut to_shade = list;
+            if let (Some(pass), Some(buffers), Some(prediction)) = (allocate, &targets.allocation, &targets.prediction) {
+                let sources = area + u32::from(directions.environment > 0);
+                pass.record(rec, &allocate::Io { samplers, prediction, arguments, list, sources, buffers });
+                to_shade = &buffers.list;
+            }
 
             // 8  Their radiance.
-            let directions = Directions::of(&self.config, inputs.environment.intensity > 0.0, area);
             shade.record(
                 rec,
                 &shade::Io {
@@ -313,7 +321,7 @@ impl Renderer {
                     environment,
                     materials,
                     arguments,
-                    list,
+                    list: to_shade,
                     lights,
                     light_count: exact + area,
                     directions,

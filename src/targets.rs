@@ -7,6 +7,7 @@ use crate::gpu::image::Image;
 use crate::gpu::memory::Location;
 use crate::gpu::recorder::States;
 use crate::gpu::retire::{Build, Retired};
+use crate::pass::allocate::AllocationBuffers;
 use crate::pass::bandwidth::{self, FORECAST_BYTES};
 use crate::pass::gbuffer::GBufferImages;
 use crate::pass::pyramid::Cells;
@@ -38,6 +39,7 @@ pub(crate) struct Targets {
     pub arguments: Buffer,
     /// Samples to shade.
     pub list: Buffer,
+    pub allocation: Option<AllocationBuffers>,
 }
 
 /// Buffers over the cells of levels above the samples.
@@ -107,6 +109,7 @@ impl Targets {
             odd: plan.odd.map(|desc| Image::new(build, desc)).transpose()?,
             resolved: Image::new(build, plan.resolved)?,
             arguments: Buffer::new(build, "arguments", ARGUMENT_BYTES, arguments, Location::Device)?,
+            allocation: plan.allocated.then(|| AllocationBuffers::new(build, plan.allocation_buffers())).transpose()?,
             list: Buffer::new(build, "list", plan.list_bytes(), storage | source, Location::Device)?,
             plan,
         })
@@ -134,7 +137,7 @@ impl Targets {
             "blocks" => cells.map(|c| &c.blocks),
             "weights" => cells.map(|c| &c.weights),
             "block arguments" => cells.map(|c| &c.arguments),
-            _ => None,
+            _ => self.allocation.as_ref().and_then(|a| a.buffer(name)),
         }
     }
 
@@ -146,8 +149,9 @@ impl Targets {
             image.retire(bag);
         }
         let cells = self.cells.map(|c| vec![c.cells, c.blocks, c.weights, c.arguments]);
+        let groups = [cells, self.luminance.map(Vec::from), self.allocation.map(|a| a.into_buffers().into_iter().collect())];
         let lists = [self.forecast, self.predicted].into_iter().flatten().chain([self.arguments, self.list]);
-        for buffer in cells.into_iter().chain(self.luminance.map(Vec::from)).flatten().chain(lists) {
+        for buffer in groups.into_iter().flatten().flatten().chain(lists) {
             states.forget(buffer.handle);
             buffer.retire(bag);
         }

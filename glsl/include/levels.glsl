@@ -47,17 +47,4 @@ struct Block {
 const uint FROM_SHADING = 1u << 30;
 const uint FROM_PARENTS = 2u << 30;
 
-// An entry of the list of samples to shade: the sample and the level of the cell that it represents.
-uint list_entry(ivec2 p, int l) {
-    return uint(p.x) | uint(p.y) << 14 | uint(l) << 28;
-}
-
-ivec2 list_sample(uint entry) {
-    return ivec2(entry & 0x3fffu, entry >> 14 & 0x3fffu);
-}
-
-int list_level(uint entry) {
-    return int(entry >> 28);
-}
-
 #endif

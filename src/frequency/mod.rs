@@ -5,6 +5,7 @@
 //! spatial cycles/metre (textures: cycles per texture unit), image cycles/pixel. Wavelet estimates are divided by their bias
 //! ([`wavelet::bias`]).
 
+pub mod allocation;
 pub mod calibration;
 pub mod environment;
 pub mod level;
@@ -14,6 +15,7 @@ pub mod reconstruction;
 pub mod texture;
 pub mod wavelet;
 
+pub use allocation::Allocation;
 pub use environment::AngularBandwidth;
 pub use operators::Operator;
 pub use texture::{TextureBandwidth, TextureCells};

@@ -1,9 +1,9 @@
 //! Layers beside radiance: what the frame's own images hold, at one shading sample an output pixel.
 
-use crate::Estimator;
 use crate::offline::error::{Error, Result};
 use crate::offline::levels;
 use crate::offline::session::Session;
+use crate::{Config, Estimator};
 
 /// A layer that `--aov` names.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -119,11 +119,12 @@ impl Aov {
         self == Self::Curvature
     }
 
-    /// The layer's channels after a frame of `side` samples a side and as many `directions` a sample of each level.
+    /// The layer's channels after a frame of `config`.
     ///
     /// # Errors
     /// The device's, on read-back.
-    pub fn read(self, session: &mut Session, side: u32, directions: &dyn Fn(u32) -> u32) -> Result<Vec<Channel>> {
+    pub fn read(self, session: &mut Session, config: &Config) -> Result<Vec<Channel>> {
+        let side = config.samples_per_side;
         let name = ALL.iter().find(|(_, a)| *a == self).map_or("", |(n, _)| n);
         let looked_up = session.config().is_some_and(|config| config.estimator == Estimator::Preconvolved);
         let covered = Pixels::read(session, "ids", side)?;
@@ -179,8 +180,10 @@ impl Aov {
             }
             Self::Shaded | Self::Samples => {
                 let mut shaded = vec![0; covered.words.len()];
-                for ([x, y], level) in levels::shaded(session)? {
-                    shaded[y as usize * covered.width + x as usize] = if self == Self::Shaded { 1 } else { directions(level) };
+                for ([x, y], directions) in levels::directions(session, config)? {
+                    // A sample may stand for cells of several levels.
+                    let sample = &mut shaded[y as usize * covered.width + x as usize];
+                    *sample = if self == Self::Shaded { 1 } else { *sample + directions };
                 }
                 scalar(covered.of(shaded).map(|t| t[0] as f32))
             }

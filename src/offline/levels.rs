@@ -1,8 +1,10 @@
 //! What the last frame decided on levels of shading, read back (`glsl/include/levels.glsl` has the encodings).
 
-use crate::Estimator;
+use crate::frequency::allocation::Allocation;
 use crate::offline::error::Result;
 use crate::offline::session::Session;
+use crate::plan::Directions;
+use crate::{Config, Estimator};
 
 /// The samples that were shaded: x, y and the level over a sample of the cell that each stands for. Pre-convolved light shades
 /// all that are covered.
@@ -22,6 +24,24 @@ pub fn shaded(session: &mut Session) -> Result<Vec<([u32; 2], u32)>> {
         if levelled { ([word & 0x3fff, word >> 14 & 0x3fff], word >> 28) } else { ([word & 0xffff, word >> 16], 0) }
     };
     Ok(list.iter().take(count).map(entry).collect())
+}
+
+/// The samples that were shaded, each with the directions drawn for it.
+///
+/// # Errors
+/// The device's, on read-back.
+pub fn directions(session: &mut Session, config: &Config) -> Result<Vec<([u32; 2], u32)>> {
+    let (environment, area_lights) = session.sources();
+    if config.allocation == Allocation::Constant {
+        let all = Directions::of(config, environment, area_lights);
+        let shaded = shaded(session)?.into_iter();
+        return Ok(shaded.map(|(sample, level)| (sample, all.at(level, config).total(area_lights))).collect());
+    }
+    let total = |n| Directions::split(config, n, environment, area_lights).total(area_lights);
+    let count = session.shaded()? as usize;
+    let list = session.words("allocated")?;
+    let entry = |words: &[u32]| Some(([words.first()? & 0x3fff, words.first()? >> 14 & 0x3fff], total(*words.get(1)?)));
+    Ok(list.chunks_exact(2).take(count).filter_map(entry).collect())
 }
 
 /// For each sample, row by row, the coarsest level over a sample whose cell around it has a value; 0 where none has one.

@@ -1,5 +1,6 @@
 //! A still image of a world, with its layers and statistics.
 
+use crate::frequency::allocation::Allocation;
 use crate::frequency::operators::{Combine, Operator};
 use crate::gpu::timer::FrameTimings;
 use crate::offline::aov::Aov;
@@ -11,7 +12,6 @@ use crate::offline::rates::Rate;
 use crate::offline::session::Session;
 use crate::offline::stats::{Pixels, Quantiles, Samples, Stats, pass_times};
 use crate::offline::world::World;
-use crate::plan::Directions;
 use crate::{Config, Estimator, Filter, Requirements};
 use serde_json::json;
 use std::collections::BTreeMap;
@@ -48,6 +48,8 @@ pub struct Settings {
     pub geometric: bool,
     /// Directions a shaded sample; with several a pixel as [`Config::directions`] says.
     pub samples: u32,
+    /// How shaded samples share them; `samples` is the mean.
+    pub allocation: Allocation,
     /// Estimator.
     pub estimator: Estimator,
     /// Shading samples a side of a pixel.
@@ -80,6 +82,7 @@ impl Settings {
             filter: base.filter,
             geometric: base.geometric,
             samples: base.directions,
+            allocation: base.allocation,
             estimator: base.estimator,
             samples_per_side: base.samples_per_side,
             seed: 0,
@@ -115,6 +118,7 @@ impl Settings {
             filter: self.filter,
             geometric: self.geometric,
             directions: self.reference.map_or(self.samples, |n| n.min(REFERENCE_CHUNK)),
+            allocation: if self.reference.is_some() { Allocation::Constant } else { self.allocation },
             curvature: self.aovs.iter().any(|a| a.needs_curvature()),
             ..base
         }
@@ -140,7 +144,7 @@ pub fn render(world: &World, settings: &Settings, progress: &mut dyn FnMut(u32, 
     let chunks = settings.chunks();
     let total = chunks + if settings.timed { WARM_UP + TIMED } else { 0 };
     let mut done = 0;
-    let image = image(&mut session, world, settings, &config, 0, &mut |_| {
+    let image = image(&mut session, settings, &config, 0, &mut |_| {
         done += 1;
         progress(done, total);
     })?;
@@ -170,7 +174,6 @@ pub(super) fn open(world: &World, settings: &Settings) -> Result<(Session, Confi
 /// reference has several.
 pub(super) fn image(
     session: &mut Session,
-    world: &World,
     settings: &Settings,
     config: &Config,
     number: u32,
@@ -189,15 +192,14 @@ pub(super) fn image(
     let channel = |c: usize| sum.iter().skip(c).step_by(4).map(|s| (s / f64::from(chunks)) as f32).collect();
     let [width, height] = settings.extent;
     let mut channels: Vec<_> = ["R", "G", "B", "A"].iter().enumerate().map(|(c, n)| (n.to_string(), channel(c))).collect();
-    let directions = sample_directions(world, config);
     for aov in &settings.aovs {
-        channels.extend(aov.read(session, settings.samples_per_side, &directions)?);
+        channels.extend(aov.read(session, config)?);
     }
     Ok(LinearImage { width, height, channels })
 }
 
-/// Counts of the session's last frame.
-pub(super) fn pixels(session: &mut Session, config: &Config) -> Result<Pixels> {
+/// Of the session's last frame: samples, and the directions drawn for them.
+pub(super) fn counts(session: &mut Session, config: &Config) -> Result<(Pixels, u64)> {
     let pixel = config.samples_per_side.ilog2() as i32;
     let mut by_level = BTreeMap::new();
     for (_, level) in levels::shaded(session)? {
@@ -206,16 +208,8 @@ pub(super) fn pixels(session: &mut Session, config: &Config) -> Result<Pixels> {
     let shaded = by_level.values().sum();
     let (ids, ..) = session.image("ids")?;
     let covered = ids.chunks_exact(4).filter(|id| id.iter().any(|byte| *byte != 0)).count() as u64;
-    Ok(Pixels { covered, shaded, by_level })
-}
-
-/// Directions of a sample that stands for a cell of a level, in levels over a sample.
-fn sample_directions(world: &World, config: &Config) -> impl Fn(u32) -> u32 {
-    let area_lights = world.lights.iter().filter(|l| l.is_area()).count() as u32;
-    let shines = world.environment.as_ref().is_some_and(|e| e.intensity > 0.0);
-    let directions = Directions::of(config, shines, area_lights);
-    let config = config.clone();
-    move |level| directions.at(level, &config).total(area_lights)
+    let taken = levels::directions(session, config)?.iter().map(|(_, n)| u64::from(*n)).sum();
+    Ok((Pixels { covered, shaded, by_level }, taken))
 }
 
 /// Statistics of the session's last frame and of the times of some.
@@ -226,21 +220,21 @@ pub(crate) fn statistics(
     session: &mut Session,
     timings: &[FrameTimings],
 ) -> Result<Stats> {
-    let pixels = pixels(session, config)?;
-    Ok(report(world, settings, config, session, timings, pixels))
+    let counts = counts(session, config)?;
+    Ok(report(world, settings, config, session, timings, counts))
 }
 
-/// Statistics of frames that took `timings` and, in the mean, shaded `pixels`.
+/// Statistics of frames that took `timings` and, in the mean, shaded `pixels` with `taken` directions.
 pub(super) fn report(
     world: &World,
     settings: &Settings,
     config: &Config,
     session: &Session,
     timings: &[FrameTimings],
-    pixels: Pixels,
+    (pixels, taken): (Pixels, u64),
 ) -> Stats {
-    let (directions, pixel) = (sample_directions(world, config), config.samples_per_side.ilog2() as i32);
-    let taken = pixels.by_level.iter().map(|(level, n)| n * u64::from(directions((level + pixel) as u32))).sum();
+    let constant = config.allocation == Allocation::Constant;
+    let budget = if constant { taken } else { pixels.shaded * u64::from(config.directions) };
     let estimator = match config.estimator {
         Estimator::Mis => "mis",
         Estimator::Brdf => "brdf",
@@ -260,6 +254,7 @@ pub(super) fn report(
         ("geometric", json!(config.geometric)),
         ("estimator", json!(estimator)),
         ("samples", json!(config.directions)),
+        ("np_rule", json!(config.allocation.name())),
         ("aa", json!(config.samples_per_side.pow(2))),
         ("seed", json!(settings.seed)),
         ("reference", json!(settings.reference)),
@@ -271,7 +266,7 @@ pub(super) fn report(
         extent: settings.extent,
         settings: values,
         pixels,
-        samples: Samples { taken, budget: taken },
+        samples: Samples { taken, budget },
         passes: pass_times(timings, session.pass_bytes()),
         frame_ms: Quantiles::of(timings.iter().map(|t| t.span_ms).collect()),
         setup_ms: session.setup().iter().copied().collect(),

@@ -4,7 +4,7 @@ use crate::offline::animation::AnimatedWorld;
 use crate::offline::error::{Error, Result};
 use crate::offline::image_io::LinearImage;
 use crate::offline::rates::Rate;
-use crate::offline::render::{Settings, TIMED, WARM_UP, image, open, pixels, report};
+use crate::offline::render::{Settings, TIMED, WARM_UP, counts, image, open, report};
 use crate::offline::stats::{Pixels, Stats};
 use serde_json::json;
 use std::collections::BTreeMap;
@@ -44,7 +44,7 @@ pub fn render_frames(
     };
     show(world, frames.start);
     let (mut session, config) = open(world.world(), settings)?;
-    let (mut times, mut counts, mut done) = (Vec::new(), Vec::new(), 0);
+    let (mut times, mut counted, mut done) = (Vec::new(), Vec::new(), 0);
     for number in frames.clone() {
         if number != frames.start {
             show(world, number);
@@ -61,7 +61,7 @@ pub fn render_frames(
                 progress(done, total);
             }
         }
-        let image = image(&mut session, world.world(), settings, &config, number, &mut |session| {
+        let image = image(&mut session, settings, &config, number, &mut |session| {
             // A frame's times arrive with the next one: the first brings the warm-up's.
             if done > warm_up {
                 times.extend(session.timings().cloned());
@@ -71,7 +71,7 @@ pub fn render_frames(
         })?;
         write(number, image)?;
         if settings.timed {
-            counts.push(pixels(&mut session, &config)?);
+            counted.push(counts(&mut session, &config)?);
         }
     }
     for _ in 0..repeated {
@@ -80,22 +80,23 @@ pub fn render_frames(
         done += 1;
         progress(done, total);
     }
-    let mut stats = report(world.world(), settings, &config, &session, &times, mean(&counts));
+    let mut stats = report(world.world(), settings, &config, &session, &times, mean(&counted));
     stats.settings.insert("frames", json!([frames.start, frames.end]));
     stats.setup_ms.insert("animation", posing);
     Ok(stats)
 }
 
 /// Means, rounded; what was shaded is the sum over levels.
-fn mean(frames: &[Pixels]) -> Pixels {
+fn mean(frames: &[(Pixels, u64)]) -> (Pixels, u64) {
     let count = (frames.len() as u64).max(1);
     let rounded = |sum: u64| (sum + count / 2) / count;
     let mut sums = BTreeMap::new();
-    for (level, pixels) in frames.iter().flat_map(|f| &f.by_level) {
+    for (level, pixels) in frames.iter().flat_map(|f| &f.0.by_level) {
         *sums.entry(*level).or_insert(0) += pixels;
     }
     let by_level: BTreeMap<i32, u64> = sums.into_iter().map(|(level, sum)| (level, rounded(sum))).collect();
-    Pixels { covered: rounded(frames.iter().map(|f| f.covered).sum()), shaded: by_level.values().sum(), by_level }
+    let covered = rounded(frames.iter().map(|f| f.0.covered).sum());
+    (Pixels { covered, shaded: by_level.values().sum(), by_level }, rounded(frames.iter().map(|f| f.1).sum()))
 }
 
 #[cfg(test)]
@@ -106,10 +107,11 @@ mod tests {
     fn means_are_over_all_frames_also_where_a_level_is_missing() {
         let frame = |covered, levels: &[(i32, u64)]| {
             let by_level: BTreeMap<_, _> = levels.iter().copied().collect();
-            Pixels { covered, shaded: by_level.values().sum(), by_level }
+            let shaded = by_level.values().sum();
+            (Pixels { covered, shaded, by_level }, 10 * shaded)
         };
-        let mean = mean(&[frame(10, &[(0, 4), (1, 2)]), frame(13, &[(0, 7)])]);
-        assert_eq!((mean.covered, mean.shaded), (12, 7));
+        let (mean, taken) = mean(&[frame(10, &[(0, 4), (1, 2)]), frame(13, &[(0, 7)])]);
+        assert_eq!((mean.covered, mean.shaded, taken), (12, 7, 65));
         assert_eq!(mean.by_level, BTreeMap::from([(0, 6), (1, 1)]));
     }
 }

@@ -342,6 +342,12 @@ impl Session {
         self.renderer.as_ref().map(Renderer::config)
     }
 
+    /// Whether the environment shines, and the number of area lights.
+    pub(crate) fn sources(&self) -> (bool, u32) {
+        let area = self.shown.lights.iter().filter(|light| light.is_area()).count();
+        (self.shown.environment.intensity > 0.0, area as u32)
+    }
+
     /// Levels of shading.
     pub(crate) fn levels(&self) -> Option<Levels> {
         self.renderer.as_ref().map(|renderer| renderer.levels().clone())

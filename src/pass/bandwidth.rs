@@ -3,6 +3,7 @@
 
 use crate::config::Config;
 use crate::error::Result;
+use crate::frequency::allocation::Allocation;
 use crate::frequency::level::samples_per_cycle;
 use crate::frequency::operators::{Combine, Operator};
 use crate::gpu::access::Access;
@@ -74,6 +75,8 @@ struct Push {
     early: u32,
     /// Where the list of all blocks begins.
     all: u32,
+    /// Of this frame's environment.
+    dark: f32,
 }
 
 /// One block in so many a side is looked at first, if it has a surface.
@@ -118,8 +121,10 @@ pub(crate) struct Io<'a> {
     pub light_count: u32,
     /// Out: the level of each sample, in levels over a sample; 0 where all samples are shaded.
     pub level: &'a Image,
-    /// Out: of each block, bandwidth in cycles/sample and the integrand's relative standard deviation; 0 where all
-    /// samples are shaded.
+    /// Radiance that is added to the mean where directions are shared out by relative deviation.
+    pub dark: f32,
+    /// Out: of each block, bandwidth in cycles/sample, the integrand's relative standard deviation and the logarithm to base 2 of
+    /// the weight by which directions are shared out; 0 where all samples are shaded alike.
     pub prediction: &'a Image,
     /// Out: which of the next passes run.
     pub forecast: &'a Buffer,
@@ -147,8 +152,14 @@ impl Bandwidth {
             Combine::Literal => 2,
         };
         let blocks = ComputePipeline::new(p.build, p.modules, &BLOCKS, p.bridge, p.slots, &[])?;
+        let allocation = match config.allocation {
+            Allocation::Constant => 0,
+            Allocation::Equation8 => 1,
+            Allocation::Deviation => 2,
+            Allocation::RelativeDeviation => 3,
+        };
         let mut make = |lights| {
-            let constants = [operator, combine, u32::from(config.widened()), lights];
+            let constants = [operator, combine, u32::from(config.widened()), lights, allocation];
             ComputePipeline::new(p.build, p.modules, &INTERFACE, p.bridge, p.slots, &constants)
         };
         let rate = config.samples_per_cycle.unwrap_or(samples_per_cycle(config.directions_a_pixel()) as f32);
@@ -159,6 +170,7 @@ impl Bandwidth {
             coarsest: config.coarsest() as i32,
             early: 0,
             all: 0,
+            dark: 0.0,
         };
         Ok(Self { blocks, pipelines: [make(0)?, make(1)?], push })
     }
@@ -216,7 +228,7 @@ impl Bandwidth {
             Resource::Buffer(&io.material_bandwidths.textures),
         ];
         let pipeline = &self.pipelines[usize::from(io.light_count > 0)];
-        let push = Push { all, ..self.push };
+        let push = Push { all, dark: io.dark, ..self.push };
         pipeline.bind(rec, io.bridge, &resources, &Push { early: 1, ..push });
         pipeline.dispatch_indirect(rec, io.forecast, OF_FIRST);
         // Where many samples are to be shaded, nothing follows: finding the others would take longer than they do.

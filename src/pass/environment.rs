@@ -29,6 +29,8 @@ pub(crate) struct EnvironmentImages {
     /// R32F: cycles/radian around each direction, one value a 2x2 block of the map that is analysed; looked up with the map's
     /// own coordinates, nearest. None unless the frame predicts bandwidth.
     pub bandwidth: Option<Image>,
+    /// Mean luminance over the sphere.
+    pub mean: f64,
     /// None unless the frame looks pre-convolved light up.
     pub prefiltered: Option<Prefiltered>,
 }
@@ -46,6 +48,7 @@ pub(crate) struct EnvironmentUpload {
     alias: ImageUpload,
     bandwidth: Option<environment_bandwidth::Work>,
     prefiltered: Option<prefilter::Work>,
+    mean: f64,
 }
 
 impl EnvironmentUpload {
@@ -69,7 +72,7 @@ impl EnvironmentUpload {
         let bandwidth = passes.bandwidth.map(|pass| pass.prepare(build, samplers, map, &upload.image)).transpose()?;
         let prefiltered = passes.prefilter.map(|pass| pass.prepare(build, samplers, map, &upload.image)).transpose()?;
         let alias = ImageUpload::new(build, alias_desc, bytemuck::cast_slice(&slots))?;
-        Ok(Self { map: upload, alias, bandwidth, prefiltered })
+        Ok(Self { map: upload, alias, bandwidth, prefiltered, mean: map.mean_luminance() })
     }
 
     /// With the passes that it was created with.
@@ -81,7 +84,7 @@ impl EnvironmentUpload {
         let bandwidth = self.bandwidth.zip(passes.bandwidth).map(|(work, pass)| pass.record(rec, &io, work, bag));
         let io = prefilter::Io { map: &map };
         let prefiltered = self.prefiltered.zip(passes.prefilter).map(|(work, pass)| pass.record(rec, &io, work, bag));
-        EnvironmentImages { map, alias, bandwidth, prefiltered }
+        EnvironmentImages { map, alias, bandwidth, prefiltered, mean: self.mean }
     }
 }
 

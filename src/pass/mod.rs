@@ -1,6 +1,7 @@
 //! The frame's passes, one file each, all of one shape: name, push constants, `Io` (all that it reads and writes), the
 //! pass, `new`, `record`.
 
+pub mod allocate;
 pub mod bandwidth;
 pub mod base;
 pub mod classify;
@@ -53,6 +54,7 @@ pub(crate) struct PassContext<'a, 'b> {
 pub fn interfaces() -> Vec<Interface> {
     let mut all = vec![filter::INTERFACE, curvature::INTERFACE, bandwidth::BLOCKS, bandwidth::INTERFACE, pyramid::INTERFACE];
     all.extend(classify::INTERFACES);
+    all.extend(allocate::INTERFACES);
     all.extend([base::INTERFACE, shade::INTERFACE, upsample::INTERFACE, resolve::INTERFACE]);
     all.extend(tonemap::INTERFACES);
     all.extend(environment_bandwidth::INTERFACES);

@@ -2,6 +2,7 @@
 
 use crate::config::{Config, Estimator};
 use crate::error::Result;
+use crate::frequency::allocation::Allocation;
 use crate::gpu::access::Access;
 use crate::gpu::buffer::Buffer;
 use crate::gpu::image::Image;
@@ -59,6 +60,7 @@ pub(crate) struct Io<'a> {
     pub environment: &'a EnvironmentImages,
     pub materials: &'a MaterialImages,
     pub arguments: &'a Buffer,
+    /// Of `classify`, or of `allocate` where samples have numbers of directions of their own.
     pub list: &'a Buffer,
     /// Exact lights first.
     pub lights: &'a Buffer,
@@ -83,7 +85,9 @@ impl Shade {
             Estimator::Lookup => 3,
         };
         let mut make = |lights| {
-            let constants = [constant, lights, u32::from(levelled), u32::from(config.widened()), config.sharing_levels()];
+            let allocated = u32::from(config.allocation != Allocation::Constant);
+            let (levelled, widened) = (u32::from(levelled), u32::from(config.widened()));
+            let constants = [constant, lights, levelled, widened, config.sharing_levels(), allocated];
             ComputePipeline::new(p.build, p.modules, &INTERFACE, p.bridge, p.slots, &constants)
         };
         Ok(Self([make(0)?, make(1)?]))

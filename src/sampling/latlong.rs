@@ -2,6 +2,7 @@
 //! clamped in v. Twin of `glsl/include/latlong.glsl`.
 
 use crate::error::{Error, Result};
+use crate::sampling::luminance;
 use glam::{DVec2, DVec3};
 use std::f64::consts::{PI, TAU};
 
@@ -67,6 +68,16 @@ impl LatLong {
         let (x, y) = (x.floor() as i64, y.floor() as i64);
         let row = |y| self.texel(x, y).lerp(self.texel(x + 1, y), fx);
         row(y).lerp(row(y + 1), fy)
+    }
+
+    /// Mean luminance over the sphere, each texel by its solid angle.
+    pub fn mean_luminance(&self) -> f64 {
+        let rows = self.texels.chunks_exact(self.width as usize).enumerate().map(|(y, row)| {
+            let band = |y: usize| (y as f64 / f64::from(self.height) * PI).cos();
+            let sum: f64 = row.iter().map(|t| luminance(DVec3::from(t.map(f64::from)))).sum();
+            0.5 * (band(y) - band(y + 1)) * sum / f64::from(self.width)
+        });
+        rows.sum()
     }
 }
 

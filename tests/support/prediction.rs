@@ -2,6 +2,7 @@
 #![allow(dead_code, reason = "each test file uses its part")]
 
 use glam::{DMat3, DVec2, DVec3};
+use passband::frequency::allocation::{DARK, Integrand};
 use passband::frequency::operators::{Combine, Probe, Surface, nearby, pixel_angle};
 use passband::frequency::{AngularBandwidth, TextureCells};
 use passband::offline::session::Session;
@@ -75,6 +76,8 @@ pub struct Predicted {
     /// The largest `terms` of any direction.
     pub greatest: f64,
     pub spread: f64,
+    /// Logarithm of the weight by which directions are shared out.
+    pub log_weight: f64,
     /// The sample that stood for the block.
     pub at: usize,
 }
@@ -133,6 +136,7 @@ impl<'a> Twin<'a> {
         let mut all = Directions { config, surface, found: Vec::new() };
         let blocks = ((block / frame.blocks[0]) << 16) | (block % frame.blocks[0]);
         let mut estimates = Vec::new();
+        let mut integrands = Vec::new();
         for i in 0..config.probes {
             let point = sobol::point(i, sobol::hash(blocks as u32) ^ seed).map(sobol::to_unit);
             let (h, density) = table.half_vector(wo.z, point);
@@ -141,6 +145,7 @@ impl<'a> Twin<'a> {
             let (Some(light), Some(bandwidth)) = (&self.world.environment, &self.environment) else { continue };
             if cosine <= 0.0 || wi.z <= 0.0 {
                 estimates.push(0.0);
+                integrands.push(Integrand::default());
                 continue;
             }
             let towards = local * wi;
@@ -148,14 +153,19 @@ impl<'a> Twin<'a> {
             let reflected = luminance(reflectance.evaluate(wi, wo)) * wi.z;
             let turned = DMat3::from_rotation_y(-light.rotation.to_radians()) * towards;
             all.add(bandwidth.towards(turned), lobes.at(wi, wo), 0.0, [radiance, reflected, 4.0 * cosine / density]);
-            estimates.push(radiance * reflected * 4.0 * cosine / density);
+            let estimate = radiance * reflected * 4.0 * cosine / density;
+            estimates.push(estimate);
+            let angular = bandwidth.towards(turned) + lobes.at(wi, wo);
+            integrands.push(Integrand { bandwidth: angular, product: radiance * reflected / wi.z, estimate });
         }
+        let mut by_lights = 0.0;
         for light in &self.world.lights {
             let (towards, distance, radiance) = arrives(light, point);
             let wi = local.transpose() * towards;
             if wi.z > 0.0 {
                 let reflected = luminance(reflectance.evaluate(wi, wo)) * wi.z;
                 let near = nearby(distance, wi.z);
+                by_lights += radiance * reflected;
                 all.add(SHARPEST, lobes.at(wi, wo), near, [radiance, reflected, f64::from(config.probes)]);
             }
         }
@@ -169,7 +179,10 @@ impl<'a> Twin<'a> {
         let spread = if mean > 0.0 { (squares - mean * mean).max(0.0).sqrt() / mean } else { 0.0 };
         let [bandwidth, terms] = [0, 1].map(|k| all.combined(k) + texture);
         let greatest = all.found.iter().map(|(b, ..)| b[1]).fold(0.0, f64::max) + texture;
-        Some(Predicted { bandwidth, terms, greatest, spread, at })
+        let map = self.world.environment.as_ref();
+        let dark = DARK * map.map_or(0.0, |light| light.intensity * light.map.mean_luminance());
+        let log_weight = config.allocation.log_weight(&integrands, by_lights, dark);
+        Some(Predicted { bandwidth, terms, greatest, spread, log_weight, at })
     }
 }
 

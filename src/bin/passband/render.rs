@@ -35,7 +35,7 @@ pub struct Args {
     /// Where to shade
     #[arg(long, default_value = "full")]
     rate: Rate,
-    /// Directions a shaded pixel
+    /// Directions a shaded pixel, their mean under a scene's settings.np_rule
     #[arg(long, value_name = "N", default_value_t = 64)]
     samples: u32,
     /// How directions are drawn
@@ -212,7 +212,8 @@ impl Args {
             eps: scene.and_then(Scene::eps).unwrap_or(EPS),
             filter,
             geometric: scene.is_some_and(Scene::geometric),
-            samples: self.samples,
+            samples: scene.and_then(Scene::budget).unwrap_or(self.samples),
+            allocation: scene.map(Scene::allocation).unwrap_or_default(),
             estimator,
             samples_per_side: self.aa,
             seed: self.seed,

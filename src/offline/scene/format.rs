@@ -264,7 +264,7 @@ pub(super) struct Settings {
     pub combine: Key<String>,
     pub eps: Key<f64>,
     pub np_rule: Key<String>,
-    pub budget: Key<f64>,
+    pub budget: Key<u32>,
     pub lmax: Key<u32>,
     pub bins: Key<String>,
     pub eps0: Key<f64>,

@@ -14,19 +14,12 @@ impl Check<'_> {
         for threshold in [&s.eps0, &s.eps1] {
             self.each(threshold, |c, v| c.number(v, "0 < threshold < 1", |v| v > 0.0 && v < 1.0))?;
         }
-        self.each(&s.budget, |c, v| c.number(v, "a number above 0", |v| v > 0.0))?;
+        let directions = "a whole number from 1 to 65536";
+        self.each(&s.budget, |c, v| c.require((1..=65536).contains(v.get_ref()), &v.span(), directions, v.get_ref()))?;
         self.each(&s.lmax, |c, v| c.require(*v.get_ref() <= 5, &v.span(), "a level from 0 to 5", v.get_ref()))?;
         self.each(&s.anisotropy, |c, v| c.number(v, "1 to 16", |v| (1.0..=16.0).contains(&v)))?;
         self.each(&s.lod_bias, |c, v| c.number(v, "-16 to 16", |v| v.abs() <= 16.0))?;
-        let all = [
-            span(&s.np_rule),
-            span(&s.budget),
-            span(&s.bins),
-            span(&s.eps0),
-            span(&s.eps1),
-            span(&s.anisotropy),
-            span(&s.lod_bias),
-        ];
+        let all = [span(&s.bins), span(&s.eps0), span(&s.eps1), span(&s.anisotropy), span(&s.lod_bias)];
         self.later.extend(all.into_iter().flatten());
         Ok(())
     }

@@ -1,5 +1,6 @@
 //! Scene files: TOML in, a resolved [`World`] out.
 
+use crate::frequency::allocation::Allocation;
 use crate::frequency::operators::{Combine, Operator};
 use crate::offline::animation::AnimatedWorld;
 use crate::offline::error::{At, Error, Result};
@@ -126,6 +127,18 @@ impl Scene {
     /// The share of the largest detail below which details do not count in analyses, if the scene says.
     pub fn eps(&self) -> Option<f64> {
         self.file.settings.eps.as_ref().map(|v| *v.get_ref())
+    }
+
+    /// How shaded samples share directions.
+    pub fn allocation(&self) -> Allocation {
+        let rules = [Allocation::Equation8, Allocation::Deviation, Allocation::RelativeDeviation];
+        let name = self.file.settings.np_rule.as_ref().map(|v| v.get_ref().as_str());
+        rules.into_iter().find(|rule| Some(rule.name()) == name).unwrap_or_default()
+    }
+
+    /// Mean directions of a shaded sample, if the scene asks for a number.
+    pub fn budget(&self) -> Option<u32> {
+        self.file.settings.budget.as_ref().map(|v| *v.get_ref())
     }
 
     /// Whether the mesh's curvature widens lobes, whatever the filter.
