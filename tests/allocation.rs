@@ -39,7 +39,7 @@ fn shared(session: &mut Session, config: &Config) -> (Entries<f64>, Entries<u32>
     let side = config.samples_per_side.max(2) as usize;
     let weight = |entry: u32| {
         let [x, y] = [entry & 0x3fff, entry >> 14 & 0x3fff].map(|p| p as usize / side);
-        weights[y * columns + x][2]
+        weights[y * columns + x][2] + config.allocation.by_level() * f64::from(entry >> 28)
     };
     let mut list: Vec<_> = session.words("list").unwrap()[..count].iter().map(|e| (*e, weight(*e))).collect();
     let mut allocated: Vec<_> =
