@@ -39,7 +39,7 @@ fn shared(session: &mut Session, config: &Config) -> (Entries<f64>, Entries<u32>
     let side = config.samples_per_side.max(2) as usize;
     let weight = |entry: u32| {
         let [x, y] = [entry & 0x3fff, entry >> 14 & 0x3fff].map(|p| p as usize / side);
-        weights[y * columns + x][2]
+        weights[y * columns + x][2] + config.allocation.by_level() * f64::from(entry >> 28)
     };
     let mut list: Vec<_> = session.words("list").unwrap()[..count].iter().map(|e| (*e, weight(*e))).collect();
     let mut allocated: Vec<_> =
@@ -123,7 +123,7 @@ fn weights_are_those_of_the_rules() {
     let glossy = ggx(0.15, DVec3::new(0.5, 0.4, 0.3), DVec3::splat(0.4));
     let ball = world("bumpy-sphere", 96, glossy, builtin::environment("sun-sky", 256).unwrap());
     for world in [&lit, &ball] {
-        let twin = Twin::new(world, EPS);
+        let twin = Twin::new(world, passband::frequency::environment::EPS);
         for rule in RULES {
             let config = Config { curvature: true, probes: 8, ..weighed([96, 80], rule, 64) };
             let mut session = session(world, &config);

@@ -18,14 +18,15 @@ layout(set = 2, binding = 3, std430) buffer Histogram {
 };
 
 layout(push_constant) uniform Push {
-    int side; // of a block, in samples
+    int side;       // of a block, in samples
+    float by_level; // added to the logarithm of a weight for each level
 } push;
 
 void main() {
     uint index = list_index();
     if (index < arguments.count) {
         uint entry = list[index];
-        float log_weight = texelFetch(prediction, list_sample(entry) / push.side, 0).z;
+        float log_weight = texelFetch(prediction, list_sample(entry) / push.side, 0).z + push.by_level * float(list_level(entry));
         atomicAdd(histogram[allocation_bin(log_weight, entry)], 1u);
     }
 }

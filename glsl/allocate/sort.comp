@@ -25,15 +25,17 @@ layout(set = 2, binding = 5, std430) writeonly buffer Allocated {
 };
 
 layout(push_constant) uniform Push {
-    vec2 range; // fewest and most directions of a sample
-    int side;   // of a block, in samples
+    vec2 range;     // fewest and most directions of a sample
+    int side;       // of a block, in samples
+    float by_level; // added to the logarithm of a weight for each level
 } push;
 
 void main() {
     uint index = list_index();
     if (index < arguments.count) {
         uint entry = list[index];
-        uint bin = allocation_bin(texelFetch(prediction, list_sample(entry) / push.side, 0).z, entry);
+        float log_weight = texelFetch(prediction, list_sample(entry) / push.side, 0).z + push.by_level * float(list_level(entry));
+        uint bin = allocation_bin(log_weight, entry);
         Share share = shares[bin];
         allocated[share.first + atomicAdd(cursors[bin], 1u)] =
             uvec2(entry, allocation_directions(share.directions, push.range, entry));

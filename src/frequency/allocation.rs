@@ -15,8 +15,8 @@ use crate::sampling::sobol;
 /// The rule by which shaded samples share the directions of a frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Allocation {
-    /// The same number each: of all rules the highest display-space PSNR at equal samples on `torus-knot`, `bunny-city` and `crowd`, and
-    /// as much as the next on `trio` (`render --rate bandwidth --set settings.np_rule=…`, `compare`).
+    /// The same number each: of all rules the best display-space PSNR at equal samples on `torus-knot`, `bunny-city` and `crowd`,
+    /// 0.2 dB below relative deviations on `trio` (`render --rate bandwidth --set settings.np_rule=…`, `compare`).
     #[default]
     Constant,
     /// Equation 8 to the letter: in proportion to the probes' sum of bandwidths of light and lobe times squared radiance times
@@ -28,8 +28,8 @@ pub enum Allocation {
     RelativeDeviation,
 }
 
-/// What is added to the mean, over the mean radiance of the environment, since in the dark noise is not seen: where sRGB's straight piece ends, of
-/// an image exposed to 0.3.
+/// What is added to the mean, over the mean radiance of the environment, since in the dark noise is not seen: where sRGB's straight
+/// piece ends, of an image exposed to 0.3.
 pub const DARK: f64 = 0.01;
 /// The relative deviation to which that of the probes is added, as variances: a few of them may agree by chance, and a sample that
 /// got the fewest directions for it would show.
@@ -67,6 +67,12 @@ impl Allocation {
             Self::Deviation => "sqrt",
             Self::RelativeDeviation => "relstd",
         }
+    }
+
+    /// What each level adds to the logarithm of a weight. A sample that stands for `a` pixels brings its error to all of them:
+    /// the sum of `a v / n` is least where `n` goes with the root of `a v`. Equation 8 takes a pixel for a pixel.
+    pub fn by_level(self) -> f64 {
+        if matches!(self, Self::Deviation | Self::RelativeDeviation) { 1.0 } else { 0.0 }
     }
 
     /// Logarithm to base 2 of the weight of a sample with these probes. Lights beside the environment bring `lights`; `dark` is

@@ -52,6 +52,7 @@ pub const INTERFACES: [Interface; 3] = [
 #[derive(Clone, Copy, Pod, Zeroable)]
 struct CountPush {
     side: i32,
+    by_level: f32,
 }
 
 #[repr(C)]
@@ -66,6 +67,7 @@ struct SharePush {
 struct SortPush {
     range: [f32; 2],
     side: i32,
+    by_level: f32,
 }
 
 /// The pass's buffers; `glsl/allocate` says what they hold.
@@ -123,6 +125,7 @@ pub(crate) struct Io<'a> {
 pub(crate) struct Allocate {
     pipelines: [ComputePipeline; 3],
     side: i32,
+    by_level: f32,
     budget: u32,
     halves: bool,
 }
@@ -134,6 +137,7 @@ impl Allocate {
         Ok(Self {
             pipelines: [make(count)?, make(share)?, make(sort)?],
             side: config.block_side() as i32,
+            by_level: config.allocation.by_level() as f32,
             budget: config.directions,
             halves: config.estimator == Estimator::Mis,
         })
@@ -160,7 +164,7 @@ impl Allocate {
         rec.buffer(histogram, Access::COMPUTE_ATOMIC);
         rec.flush();
         let resources = [arguments, list, prediction, Resource::Buffer(histogram)];
-        count.bind(rec, BridgeSets::NONE, &resources, &CountPush { side: self.side });
+        count.bind(rec, BridgeSets::NONE, &resources, &CountPush { side: self.side, by_level: self.by_level });
         count.dispatch_indirect(rec, io.arguments, 0);
 
         rec.buffer(histogram, Access::COMPUTE_READ);
@@ -177,7 +181,7 @@ impl Allocate {
         rec.flush();
         let [shares, cursors, allocated] = [shares, cursors, allocated].map(Resource::Buffer);
         let resources = [arguments, list, prediction, shares, cursors, allocated];
-        sort.bind(rec, BridgeSets::NONE, &resources, &SortPush { range, side: self.side });
+        sort.bind(rec, BridgeSets::NONE, &resources, &SortPush { range, side: self.side, by_level: self.by_level });
         sort.dispatch_indirect(rec, io.arguments, 0);
         rec.end();
     }
