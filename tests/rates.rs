@@ -5,11 +5,11 @@ mod support;
 
 use passband::offline::headless::Options;
 use passband::offline::levels;
-use passband::offline::rates::{Rate, oracle};
-use passband::{Config, Rate as Own};
+use passband::offline::rates::{Given, oracle};
+use passband::{Config, Rate};
 use support::{scene, session};
 
-fn config(rate: Own) -> Config {
+fn config(rate: Rate) -> Config {
     Config { frames_in_flight: 1, rate, ..Config::new([160, 120]) }
 }
 
@@ -18,8 +18,9 @@ fn the_oracle_shades_less_than_bandwidth_at_no_more_error() {
     let device = Options { device: Some("llvmpipe".into()), validate: true };
     for name in ["torus-knot", "trio"] {
         let world = scene(name);
-        let config = config(Own::Given);
-        let (oracle, bandwidth) = oracle::of(&world, &config, &device, 0).unwrap();
+        let config = config(Rate::Given);
+        let bandwidth = oracle::predicted(&world, &config, &device, 0).unwrap();
+        let oracle = oracle::converged(&world, &config, &device, 0).unwrap();
         let predicted = oracle.outcome(&bandwidth);
         let (best, expected) = oracle.cheapest(predicted.error);
         assert_eq!(oracle.outcome(&best), expected);
@@ -43,11 +44,11 @@ fn the_oracle_shades_less_than_bandwidth_at_no_more_error() {
 #[test]
 fn contrast_of_the_frame_before_steers_luminance() {
     let world = scene("trio");
-    let config = config(Own::Given);
+    let config = config(Rate::Given);
     let mut session = session(&world, &config);
     let device = Options { device: Some("llvmpipe".into()), validate: true };
-    Rate::Luminance.prepare(&mut session, &world, &config, &device, 0).unwrap();
-    Rate::Luminance.follow(&mut session, &config).unwrap();
+    Given::Luminance.prepare(&mut session, &world, &config, &device, 0).unwrap();
+    Given::Luminance.follow(&mut session, &config).unwrap();
     session.frame([0, 0]).unwrap();
     let shaded = levels::shaded(&mut session).unwrap();
     let surface = support::surface(&mut session, &world, &config);

@@ -1,18 +1,17 @@
 //! A still image of a world, with its layers and statistics.
 
-use crate::frequency::operators::{Combine, Operator};
 use crate::gpu::timer::FrameTimings;
 use crate::offline::aov::Aov;
 use crate::offline::error::Result;
 use crate::offline::headless::{Headless, Options};
 use crate::offline::image_io::LinearImage;
 use crate::offline::levels;
-use crate::offline::rates::Rate;
+use crate::offline::rates::Given;
 use crate::offline::session::Session;
 use crate::offline::stats::{Pixels, Quantiles, Samples, Stats, pass_times};
 use crate::offline::world::World;
 use crate::plan::Directions;
-use crate::{Config, Estimator, Filter, Requirements};
+use crate::{Config, Estimator, Filter, Rate, Requirements};
 use serde_json::json;
 use std::collections::BTreeMap;
 
@@ -24,37 +23,17 @@ const TIMED: u32 = 5;
 const REFERENCE_CHUNK: u32 = 1024;
 
 /// What to render.
-#[derive(Clone, Debug)]
+#[derive(Clone)]
 pub struct Settings {
-    /// Output pixels.
-    pub extent: [u32; 2],
-    /// Where samples are shaded.
-    pub rate: Rate,
-    /// Coarsest level, in output pixels; `None` is the default.
-    pub lmax: Option<u32>,
-    /// Directions in which the prediction of bandwidth looks.
-    pub probes: u32,
-    /// Samples that a predicted cycle gets; `None` is the rule.
-    pub samples_per_cycle: Option<f32>,
-    /// What the prediction takes for reflection.
-    pub operator: Operator,
-    /// How it combines its probes.
-    pub combine: Combine,
-    /// How materials are read.
-    pub filter: Filter,
-    /// Whether the mesh's curvature widens lobes, whatever the filter.
-    pub geometric: bool,
-    /// Directions a shaded sample.
-    pub samples: u32,
-    /// Estimator.
-    pub estimator: Estimator,
-    /// Shading samples a side of a pixel.
-    pub samples_per_side: u32,
+    /// What the renderer is built for.
+    pub config: Config,
+    /// Who gives the levels of [`crate::Rate::Given`].
+    pub given: Option<Given>,
     /// Seed of the sample points.
     pub seed: u32,
     /// Extra layers.
     pub aovs: Vec<Aov>,
-    /// Directions a pixel of a converged image instead, with the default estimator.
+    /// Directions a pixel of a converged image instead, at the full rate with the default estimator.
     pub reference: Option<u32>,
     /// Whether to time frames.
     pub timed: bool,
@@ -63,51 +42,36 @@ pub struct Settings {
 }
 
 impl Settings {
-    /// Defaults for an image of `extent` pixels: full rate, 64 directions, one sample a pixel, nothing beside it.
-    pub fn new(extent: [u32; 2]) -> Self {
-        let base = Config::new(extent);
-        Self {
-            extent,
-            rate: base.rate.into(),
-            lmax: None,
-            probes: base.probes,
-            samples_per_cycle: base.samples_per_cycle,
-            operator: base.operator,
-            combine: base.combine,
-            filter: base.filter,
-            geometric: base.geometric,
-            samples: base.directions,
-            estimator: base.estimator,
-            samples_per_side: base.samples_per_side,
-            seed: 0,
-            aovs: Vec::new(),
-            reference: None,
-            timed: false,
-            device: Options::default(),
-        }
+    /// One frame of `config` with nothing beside it.
+    pub fn new(config: Config) -> Self {
+        Self { config, given: None, seed: 0, aovs: Vec::new(), reference: None, timed: false, device: Options::default() }
     }
 
-    fn rate(&self) -> Rate {
-        if self.reference.is_some() { crate::Rate::Full.into() } else { self.rate }
-    }
-
+    /// The configuration in force: each frame is waited for, and a reference is its own.
     pub(crate) fn config(&self) -> Config {
-        let base = Config::new(self.extent);
-        Config {
-            samples_per_side: self.samples_per_side,
+        let base = Config {
             frames_in_flight: 1,
-            estimator: if self.reference.is_some() { Estimator::Mis } else { self.estimator },
-            rate: self.rate().of_renderer(),
-            lmax: self.lmax.unwrap_or(base.lmax),
-            probes: self.probes,
-            samples_per_cycle: self.samples_per_cycle,
-            operator: self.operator,
-            combine: self.combine,
-            filter: self.filter,
-            geometric: self.geometric,
-            directions: self.reference.map_or(self.samples, |n| n.min(REFERENCE_CHUNK)),
-            curvature: self.aovs.iter().any(|a| a.needs_curvature()),
-            ..base
+            curvature: self.config.curvature || self.aovs.iter().any(|a| a.needs_curvature()),
+            ..self.config.clone()
+        };
+        let Some(directions) = self.reference else { return base };
+        Config { rate: Rate::Full, estimator: Estimator::Mis, directions: directions.min(REFERENCE_CHUNK), ..base }
+    }
+
+    /// Who gives the levels, if anybody does.
+    pub(crate) fn given(&self) -> Option<Given> {
+        self.given.filter(|_| self.config().rate == Rate::Given)
+    }
+
+    /// As `--rate` calls it.
+    fn rate(&self) -> &'static str {
+        match (self.config().rate, self.given) {
+            (Rate::Full, _) => "full",
+            (Rate::Uniform(1), _) => "half",
+            (Rate::Uniform(2), _) => "quarter",
+            (Rate::Uniform(_), _) => "uniform",
+            (Rate::Bandwidth, _) => "bandwidth",
+            (Rate::Given, given) => given.map_or("given", Given::name),
         }
     }
 }
@@ -129,14 +93,14 @@ pub fn render(world: &World, settings: &Settings, progress: &mut dyn FnMut(u32, 
     config.validate()?;
     let headless = Headless::new(&settings.device, &Requirements::of(&config))?;
     let mut session = Session::new(headless, world, &config)?;
-    let rate = settings.rate();
-    rate.prepare(&mut session, world, &config, &settings.device, settings.seed)?;
+    let given = settings.given();
+    given.iter().try_for_each(|given| given.prepare(&mut session, world, &config, &settings.device, settings.seed))?;
     let chunks = settings.reference.map_or(1, |n| n.div_ceil(config.directions));
     let total = chunks + if settings.timed { WARM_UP + TIMED } else { 0 };
 
     let mut sum: Vec<f64> = Vec::new();
     for chunk in 0..chunks {
-        rate.follow(&mut session, &config)?;
+        given.iter().try_for_each(|given| given.follow(&mut session, &config))?;
         session.frame([settings.seed, chunk])?;
         let (bytes, ..) = session.image("resolved")?;
         let values: Vec<f32> = bytemuck::pod_collect_to_vec(&bytes);
@@ -145,16 +109,16 @@ pub fn render(world: &World, settings: &Settings, progress: &mut dyn FnMut(u32, 
         progress(chunk + 1, total);
     }
     let channel = |c: usize| sum.iter().skip(c).step_by(4).map(|s| (s / f64::from(chunks)) as f32).collect();
-    let [width, height] = settings.extent;
+    let [width, height] = config.extent;
     let mut channels: Vec<_> = ["R", "G", "B", "A"].iter().enumerate().map(|(c, n)| (n.to_string(), channel(c))).collect();
     for aov in &settings.aovs {
-        channels.extend(aov.read(&mut session, settings.samples_per_side, config.directions)?);
+        channels.extend(aov.read(&mut session, config.samples_per_side, config.directions)?);
     }
 
     // A frame's times arrive when its slot is recorded again.
     let mut timings: Vec<FrameTimings> = Vec::new();
     for frame in 0..if settings.timed { WARM_UP + TIMED } else { 0 } {
-        rate.follow(&mut session, &config)?;
+        given.iter().try_for_each(|given| given.follow(&mut session, &config))?;
         session.frame([settings.seed, 0])?;
         if frame >= WARM_UP {
             timings.extend(session.timings().cloned());
@@ -191,7 +155,7 @@ pub(crate) fn statistics(
         Estimator::Lookup => "lookup",
     };
     let values = BTreeMap::from([
-        ("rate", json!(settings.rate().name())),
+        ("rate", json!(settings.rate())),
         ("lmax", json!(config.lmax)),
         ("filter", json!(if config.filter == Filter::Tk { "tk" } else { "point" })),
         ("probes", json!(config.probes)),
@@ -209,7 +173,7 @@ pub(crate) fn statistics(
         schema: 1,
         device: session.headless().info().clone(),
         scene: world.name.clone(),
-        extent: settings.extent,
+        extent: config.extent,
         settings: values,
         pixels: Pixels { covered, shaded, by_level },
         samples: Samples { taken, budget: taken },

@@ -1,5 +1,8 @@
 //! A bench's report as tables on the terminal.
 
+#[path = "bench_gains.rs"]
+mod gains;
+
 use comfy_table::{CellAlignment, Table, presets};
 use passband::offline::bench::cases::Half;
 use passband::offline::bench::equal::{Equal, Is};
@@ -10,6 +13,13 @@ const LEGEND: &str = "of the first's: frame time over the first variant's, with 
 speed-up: over full rate with mis where that has the same rmse, with its interval; at PSNR: where it has the same PSNR
 error: rmse over that of full rate with mis in the same time; of its own: speed-up over full rate with the same estimator
 < and > are bounds: full rate was not measured further";
+
+/// What the table of gains has in its columns.
+const COLUMNS: &str = "Full rate against the predicted rate with as many directions (Bagher et al. 2011, figure 13)
+equal N: full over predicted frame time, and predicted over full rmse there; equal rmse: full over predicted frame time where full
+rate has the predicted one's rmse, which is adaptivity's gain alone; best: the same of the best setting of each scene; random: of
+brdf-random on both sides; MIS alone: full rate with mis against full rate with brdf-random at equal rmse; together: the predicted
+rate with mis against full rate with brdf-random; overhead: bandwidth, pyramid, classify and upsample over full rate's frame";
 
 /// The whole report.
 pub fn text(report: &Report) -> String {
@@ -23,6 +33,16 @@ pub fn text(report: &Report) -> String {
     }
     if report.scenes.iter().any(|scene| scene.reference.is_some()) {
         parts.push(LEGEND.into());
+    }
+    if !report.table.is_empty() {
+        parts.push(format!("{COLUMNS}\n{}", gains::halves(report)));
+        parts.extend(gains::tables(&report.table));
+    }
+    if !report.targets.is_empty() {
+        parts.push(format!("Aims\n{}", gains::targets(&report.targets)));
+    }
+    if report.scenes.iter().any(|scene| scene.environment.is_some()) {
+        parts.push(format!("A new environment in every frame would cost\n{}", gains::environments(&report.scenes)));
     }
     if !report.summary.is_empty() {
         parts.push(format!("Speed-up at equal error against full rate, over scenes\n{}", summary(&report.summary)));

@@ -6,11 +6,11 @@ use passband::offline::error::{Error, Result};
 use passband::offline::headless::Options;
 use passband::offline::image_io::{LinearImage, check_writable, write_atomically, write_image};
 use passband::offline::metrics::{Exposure, encode};
-use passband::offline::rates;
+use passband::offline::rates::Given;
 use passband::offline::render::{Settings, render};
 use passband::offline::scene::Scene;
 use passband::sampling::luminance;
-use passband::{Estimator, Filter};
+use passband::{Config, Estimator, Filter};
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Instant;
@@ -156,15 +156,16 @@ fn assignment(text: &str) -> std::result::Result<(String, String), String> {
 }
 
 impl Args {
-    fn settings(&self, scene_size: Option<[u32; 2]>, scene: Option<&Scene>) -> Result<Settings> {
+    /// In the place of what the scene says in `base`.
+    fn settings(&self, base: Config) -> Result<Settings> {
         let later = |yes: bool, what: &str| if yes { Err(Error::NotSupportedYet { what: what.into() }) } else { Ok(()) };
-        let rate = match self.rate {
-            Rate::Full => passband::Rate::Full.into(),
-            Rate::Half => passband::Rate::Uniform(1).into(),
-            Rate::Quarter => passband::Rate::Uniform(2).into(),
-            Rate::Bandwidth => passband::Rate::Bandwidth.into(),
-            Rate::Luminance => rates::Rate::Luminance,
-            Rate::Oracle => rates::Rate::Oracle,
+        let (rate, given) = match self.rate {
+            Rate::Full => (passband::Rate::Full, None),
+            Rate::Half => (passband::Rate::Uniform(1), None),
+            Rate::Quarter => (passband::Rate::Uniform(2), None),
+            Rate::Bandwidth => (passband::Rate::Bandwidth, None),
+            Rate::Luminance => (passband::Rate::Given, Some(Given::Luminance)),
+            Rate::Oracle => (passband::Rate::Given, Some(Given::Oracle)),
         };
         let estimator = match self.estimator {
             Method::Mis => Estimator::Mis,
@@ -184,31 +185,34 @@ impl Args {
         };
         later(self.frames.is_some(), "--frames")?;
         later(!self.literal.is_empty(), "--literal")?;
-        Ok(Settings {
-            extent: self.size.or(scene_size).unwrap_or([512, 512]),
+        let config = Config {
             rate,
-            lmax: scene.and_then(Scene::lmax),
-            probes: self.probes.unwrap_or(4),
+            probes: self.probes.unwrap_or(base.probes),
             samples_per_cycle: self.spc.0,
-            operator: scene.map(Scene::operator).unwrap_or_default(),
-            combine: scene.map(Scene::combine).unwrap_or_default(),
             filter,
-            geometric: scene.is_some_and(Scene::geometric),
-            samples: self.samples,
+            directions: self.samples,
             estimator,
             samples_per_side: self.aa,
+            ..base
+        };
+        Ok(Settings {
+            given,
             seed: self.seed,
             aovs: self.aov.iter().map(|name| name.parse()).collect::<Result<_>>()?,
             reference: self.reference,
             timed: self.stats.is_some(),
             device: Options { device: self.device.clone(), validate: self.validate },
+            ..Settings::new(config)
         })
     }
 }
 
+/// Image size where neither the command nor the scene says one.
+const SIZE: [u32; 2] = [512, 512];
+
 /// Runs the subcommand.
 pub fn run(args: &Args) -> Result<ExitCode> {
-    args.settings(None, None)?;
+    args.settings(Config::new(SIZE))?;
     let extension = args.output.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
     if !["exr", "png", "hdr"].contains(&extension.as_str()) {
         return Err(Error::argument("--output", "a name that ends in .exr, .png or .hdr", args.output.display()));
@@ -219,7 +223,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let scene = Scene::load(&args.scene, &args.set)?;
     let world = scene.resolve()?;
     let loading = clock.elapsed().as_secs_f64() * 1e3;
-    let settings = args.settings(world.size, Some(&scene))?;
+    let settings = args.settings(scene.config(args.size.or(world.size).unwrap_or(SIZE)))?;
 
     let style = ProgressStyle::with_template("{msg} {bar:30} {pos}/{len} {eta}").unwrap_or_else(|_| ProgressStyle::default_bar());
     let bar = ProgressBar::new(1).with_style(style).with_message("frames");

@@ -10,43 +10,21 @@ use crate::offline::headless::Options;
 use crate::offline::session::Session;
 use crate::offline::world::World;
 
-/// Where samples are shaded.
+/// Who gives the levels of [`crate::Rate::Given`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Rate {
-    /// As the renderer itself decides.
-    Own(crate::Rate),
-    /// By the contrast of the frame before ([`luminance`]).
+pub enum Given {
+    /// The contrast of the frame before ([`luminance`]).
     Luminance,
-    /// With the fewest samples for the error of [`crate::Rate::Bandwidth`] ([`oracle`]).
+    /// A search for the fewest samples for the error of [`crate::Rate::Bandwidth`] ([`oracle`]).
     Oracle,
 }
 
-impl From<crate::Rate> for Rate {
-    fn from(rate: crate::Rate) -> Self {
-        Self::Own(rate)
-    }
-}
-
-impl Rate {
-    /// The renderer's own rate.
-    pub fn of_renderer(self) -> crate::Rate {
-        match self {
-            Self::Own(rate) => rate,
-            Self::Luminance | Self::Oracle => crate::Rate::Given,
-        }
-    }
-
+impl Given {
     /// As `--rate` calls it.
     pub fn name(self) -> &'static str {
         match self {
             Self::Luminance => "luminance",
             Self::Oracle => "oracle",
-            Self::Own(crate::Rate::Full) => "full",
-            Self::Own(crate::Rate::Uniform(1)) => "half",
-            Self::Own(crate::Rate::Uniform(2)) => "quarter",
-            Self::Own(crate::Rate::Uniform(_)) => "uniform",
-            Self::Own(crate::Rate::Given) => "given",
-            Self::Own(crate::Rate::Bandwidth) => "bandwidth",
         }
     }
 
@@ -57,7 +35,6 @@ impl Rate {
     /// The device's.
     pub fn prepare(self, session: &mut Session, world: &World, config: &Config, device: &Options, seed: u32) -> Result<()> {
         match self {
-            Self::Own(_) => Ok(()),
             Self::Luminance => {
                 let samples = config.extent.map(|e| (e * config.samples_per_side) as usize);
                 session.set_levels(&vec![0; samples[0] * samples[1]])?;
