@@ -115,6 +115,7 @@ impl Args {
             },
             rounds: self.rounds,
             extent: self.size,
+            curves: self.plots.is_some(),
             scenes: self.scenes.clone(),
             device: Options { device: self.device.clone(), validate: false },
             root: PathBuf::new(),

@@ -6,7 +6,7 @@ use crate::offline::bench::quality::{self, Frame};
 use crate::offline::bench::reference::Converged;
 use crate::offline::bench::report::SceneReport;
 use crate::offline::bench::spectrum;
-use crate::offline::bench::tiles::{Tile, covered_median, difference, heat, levels, mask, photograph};
+use crate::offline::bench::tiles::{KEY, Tile, covered_median, difference, heat, levels, mask, photograph};
 use crate::offline::error::Result;
 use crate::offline::headless::Headless;
 use crate::offline::image_io::LinearImage;
@@ -125,7 +125,7 @@ impl Stage<'_> {
             let share = 100.0 * shot.shaded;
             tiles.push(self.photograph(format!("{name}: PSNR {:.1} dB, {:.1} ms", shot.error.psnr, shot.ms), &shot));
             tiles.push(heat(format!("bandwidth, 0 to {FASTEST} cycles a pixel"), &image, "bandwidth.Y", FASTEST));
-            tiles.push(levels(format!("levels: {share:.1} % shaded"), &shot.image));
+            tiles.push(levels(format!("levels {KEY}: {share:.1} % shaded"), &shot.image));
         }
         let title = self.title("Figure 6: probes combined by their mean and by their maximum");
         Ok(Figure { name: "figure-06", title, columns: 3, tiles })
@@ -237,7 +237,8 @@ impl Stage<'_> {
             let label = format!("{} samples a pixel: {:.1} ms", side * side, stats.frame_ms.median);
             images.push(photograph(label, &picture(&image), exposure));
             let shaded = share(stats.pixels.shaded, stats.pixels.covered);
-            let label = format!("{shaded:.1} % shaded, {:.0} % of it finer than a pixel", share(finer, stats.pixels.shaded));
+            let finer = share(finer, stats.pixels.shaded);
+            let label = format!("levels {KEY}: {shaded:.1} % shaded, {finer:.0} % of it finer than a pixel");
             maps.push(levels(label, &image));
         }
         let first = images.first().map(|tile| tile.busiest(DETAILS)).unwrap_or_default();

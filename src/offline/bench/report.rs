@@ -75,7 +75,7 @@ pub struct SceneReport {
     pub extent: [u32; 2],
     /// What a new environment costs; absent in suites without errors and in scenes without one.
     pub environment: Option<EnvironmentTimes>,
-    /// Error of reconstruction alone over shaded samples; empty in suites without errors.
+    /// Error of reconstruction alone over shaded samples; empty unless it is asked for, in suites with errors.
     pub curves: Vec<Curve>,
     /// What errors are against; absent in suites without errors.
     pub reference: Option<ReferenceReport>,
@@ -242,15 +242,20 @@ impl Row {
     }
 }
 
-/// Gains of every variant over the scenes of each half, in the order in which they first appear.
+/// Gains of every variant over the scenes of each half, in the order in which they first appear; of other settings than the
+/// default those by which it is chosen: with the same estimator on both sides, at equal root mean squared error.
 pub fn gains(scenes: &[SceneReport]) -> Vec<Gain> {
     type Key<'a> = (Option<Half>, &'a str, &'static str, &'static str);
     let mut found: Vec<(Key<'_>, Vec<(&str, SpeedUp)>)> = Vec::new();
     for scene in scenes {
-        let compared = scene.variants.iter().filter(|row| row.part == Part::Compared);
-        for (row, against) in compared.flat_map(|row| row.against.iter().map(move |a| (row, a))) {
+        for (row, against) in scene.variants.iter().flat_map(|row| row.against.iter().map(move |a| (row, a))) {
             for (measure, equal) in [("rmse", against.rmse), ("psnr", against.psnr)] {
-                let Some(equal) = equal else { continue };
+                let counts = match row.part {
+                    Part::Compared => true,
+                    Part::Setting => against.estimator == "mis" && measure == "rmse",
+                    Part::FallBack | Part::Control => false,
+                };
+                let Some(equal) = equal.filter(|_| counts) else { continue };
                 let entry = (scene.name.as_str(), SpeedUp { factor: equal.speed_up, is: equal.speed_up_is });
                 let key = (scene.half, row.name.as_str(), against.estimator, measure);
                 match found.iter_mut().find(|(known, _)| *known == key) {

@@ -45,6 +45,8 @@ pub struct Order {
     pub rounds: Option<u32>,
     /// Image size; the scene's, else the preset's, without.
     pub extent: Option<[u32; 2]>,
+    /// Whether to find the errors of reconstruction alone.
+    pub curves: bool,
     /// Scene files or built-in names in the place of the suite's own.
     pub scenes: Vec<String>,
     /// Device.
@@ -191,8 +193,10 @@ impl Run<'_, '_, '_> {
         if order.suite.error_frames() > 0 {
             let reference = self.judge(&world, &base, &frames, &mut found)?;
             let told = |progress: &mut Progress<'_>, what| progress(&format!("{name}: {what}"), 0, 1);
-            told(self.progress, "curves");
-            found.curves = curves::of(&world, &base)?;
+            if order.curves {
+                told(self.progress, "curves");
+                found.curves = curves::of(&world, &base)?;
+            }
             if let Some(light) = &world.environment {
                 found.environment = Some(environment::times(&light.map, &base, self.report.rounds)?);
             }

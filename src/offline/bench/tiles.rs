@@ -8,6 +8,8 @@ const NOTHING: [u8; 3] = [120, 120, 120];
 /// From level -2 (a sixteenth of a pixel) to 5: fine ones warm, coarse ones cold and dark.
 const LEVELS: [[u8; 3]; 8] =
     [[255, 255, 255], [255, 225, 90], [240, 120, 50], [190, 50, 80], [110, 50, 140], [50, 80, 170], [40, 60, 110], [20, 30, 60]];
+/// Those that a frame without antialiasing has by default, in words, and the finer ones.
+pub const KEY: &str = "(-1 yellow, 0 orange, 1 red, 2 violet, 3 blue)";
 /// Level of the first colour.
 const FINEST: f32 = -2.0;
 /// What differences are multiplied with.
