@@ -24,6 +24,8 @@ const PATIENT: f32 = 1e-4;
 const MEASURED: u32 = 256;
 /// Probes of figure 12.
 const PROBES: [u32; 4] = [1, 4, 16, 64];
+/// Probes of figure 14: n of them find no spread above the root of n - 1.
+const MANY: u32 = 64;
 /// Cycles/pixel, and standard deviations over the mean, at the bright end of a scale.
 const FASTEST: f64 = 0.5;
 const WIDEST: f64 = 4.0;
@@ -125,7 +127,7 @@ impl Stage<'_> {
             let share = 100.0 * shot.shaded;
             tiles.push(self.photograph(format!("{name}: PSNR {:.1} dB, {:.1} ms", shot.error.psnr, shot.ms), &shot));
             tiles.push(heat(format!("bandwidth, 0 to {FASTEST} cycles a pixel"), &image, "bandwidth.Y", FASTEST));
-            tiles.push(levels(format!("levels {KEY}: {share:.1} % shaded"), &shot.image));
+            tiles.push(levels(format!("levels: {share:.1} % shaded\n{KEY}"), &shot.image));
         }
         let title = self.title("Figure 6: probes combined by their mean and by their maximum");
         Ok(Figure { name: "figure-06", title, columns: 3, tiles })
@@ -171,7 +173,7 @@ impl Stage<'_> {
 
     /// Figure 14: predicted spread and bandwidth against measured ones.
     fn validation(&self) -> Result<Figure> {
-        let patient = Config { samples_per_cycle: Some(PATIENT), ..self.predicted() };
+        let patient = Config { samples_per_cycle: Some(PATIENT), probes: MANY, ..self.predicted() };
         let predicted = self.render(patient.clone(), &[Aov::Bandwidth, Aov::Spread], false)?.image;
         let shot = self.shot(self.predicted(), &[])?;
         let [width, height] = self.base.config.extent;
@@ -238,7 +240,7 @@ impl Stage<'_> {
             images.push(photograph(label, &picture(&image), exposure));
             let shaded = share(stats.pixels.shaded, stats.pixels.covered);
             let finer = share(finer, stats.pixels.shaded);
-            let label = format!("levels {KEY}: {shaded:.1} % shaded, {finer:.0} % of it finer than a pixel");
+            let label = format!("levels: {shaded:.1} % shaded, {finer:.0} % of it finer than a pixel\n{KEY}");
             maps.push(levels(label, &image));
         }
         let first = images.first().map(|tile| tile.busiest(DETAILS)).unwrap_or_default();

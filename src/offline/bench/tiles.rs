@@ -8,8 +8,8 @@ const NOTHING: [u8; 3] = [120, 120, 120];
 /// From level -2 (a sixteenth of a pixel) to 5: fine ones warm, coarse ones cold and dark.
 const LEVELS: [[u8; 3]; 8] =
     [[255, 255, 255], [255, 225, 90], [240, 120, 50], [190, 50, 80], [110, 50, 140], [50, 80, 170], [40, 60, 110], [20, 30, 60]];
-/// Those that a frame without antialiasing has by default, in words, and the finer ones.
-pub const KEY: &str = "(-1 yellow, 0 orange, 1 red, 2 violet, 3 blue)";
+/// Those that frames have by default, in words.
+pub const KEY: &str = "-2 white, -1 yellow, 0 orange, 1 red, 2 violet, 3 blue";
 /// Level of the first colour.
 const FINEST: f32 = -2.0;
 /// What differences are multiplied with.
@@ -18,7 +18,7 @@ const GAIN: f64 = 4.0;
 /// A labelled image.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tile {
-    /// What it is.
+    /// What it is, in one line or two.
     pub label: String,
     /// Columns.
     pub width: u32,
