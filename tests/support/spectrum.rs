@@ -47,7 +47,7 @@ pub fn ratios(k: f64, size: usize) -> Vec<f64> {
             if window.iter().any(|(_, b)| *b > RANGE[1]) {
                 continue;
             }
-            let measured = bandwidth(&window.iter().map(|w| w.0).collect::<Vec<_>>());
+            let measured = bandwidth(&window.iter().map(|w| Some(w.0)).collect::<Vec<_>>()).expect("the whole window has values");
             let (_, predicted) = window[WINDOW / 2 * WINDOW + WINDOW / 2];
             if measured >= RANGE[0] {
                 ratios.push(predicted / measured);

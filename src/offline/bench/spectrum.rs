@@ -8,13 +8,20 @@ pub const WINDOW: usize = 32;
 /// Pixels between windows.
 const STEP: usize = 4;
 
-/// The radius in cycles/pixel that holds 95 % of the power of a window without its mean, under a Hann window. `values` are
-/// [`WINDOW`] rows of as many pixels; 0 if there is no power.
-pub fn bandwidth(values: &[f64]) -> f64 {
+/// The radius in cycles/pixel that holds 95 % of the power of a window without its mean, under a Hann window; 0 if there is no
+/// power. `values` are [`WINDOW`] rows of as many pixels; those without a value are taken for the mean, and `None` is returned
+/// where they have more than half of the weight.
+pub fn bandwidth(values: &[Option<f64>]) -> Option<f64> {
     let hann = |i: usize| 0.5 - 0.5 * (TAU * (i as f64 + 0.5) / WINDOW as f64).cos();
     let weight = |i: usize| hann(i % WINDOW) * hann(i / WINDOW);
-    let (sum, weights) = values.iter().enumerate().fold((0.0, 0.0), |(s, w), (i, v)| (s + v * weight(i), w + weight(i)));
-    let plain: Vec<DVec2> = values.iter().enumerate().map(|(i, v)| DVec2::new((v - sum / weights) * weight(i), 0.0)).collect();
+    let known = || values.iter().enumerate().filter_map(|(i, v)| Some((weight(i), (*v)?)));
+    let (sum, weights) = known().fold((0.0, 0.0), |(s, w), (weight, v)| (s + v * weight, w + weight));
+    let all: f64 = (0..WINDOW * WINDOW).map(weight).sum();
+    if weights < 0.5 * all {
+        return None;
+    }
+    let off = |(i, v): (usize, &Option<f64>)| DVec2::new(v.map_or(0.0, |v| (v - sum / weights) * weight(i)), 0.0);
+    let plain: Vec<DVec2> = values.iter().enumerate().map(off).collect();
     // Rows, then columns.
     let spectrum = transposed_transform(&transposed_transform(&plain));
     let frequency = |i: usize| if i > WINDOW / 2 { i as f64 - WINDOW as f64 } else { i as f64 } / WINDOW as f64;
@@ -28,11 +35,11 @@ pub fn bandwidth(values: &[f64]) -> f64 {
         below += p;
         below >= 0.95 * total
     });
-    reached.filter(|_| total > 0.0).map_or(0.0, |(f, _)| *f)
+    Some(reached.filter(|_| total > 0.0).map_or(0.0, |(f, _)| *f))
 }
 
 /// Of each pixel of an image of `width` columns, row by row, the [`bandwidth`] of the window around it, every few pixels anew;
-/// `None` where the window leaves the image or meets a pixel that has no value.
+/// `None` for pixels without a value, and where the window leaves the image.
 pub fn map(values: &[Option<f64>], width: usize) -> Vec<Option<f64>> {
     let height = values.len() / width.max(1);
     let around = |x: usize, y: usize| {
@@ -40,13 +47,16 @@ pub fn map(values: &[Option<f64>], width: usize) -> Vec<Option<f64>> {
         if left + WINDOW > width || top + WINDOW > height {
             return None;
         }
-        let pixel = |i: usize| *values.get((top + i / WINDOW) * width + left + i % WINDOW)?;
-        Some(bandwidth(&(0..WINDOW * WINDOW).map(pixel).collect::<Option<Vec<_>>>()?))
+        let pixel = |i: usize| values.get((top + i / WINDOW) * width + left + i % WINDOW).copied().flatten();
+        bandwidth(&(0..WINDOW * WINDOW).map(pixel).collect::<Vec<_>>())
     };
     let columns = width.div_ceil(STEP);
     let middle = |i: usize| i * STEP + STEP / 2;
     let found: Vec<_> = (0..columns * height.div_ceil(STEP)).map(|i| around(middle(i % columns), middle(i / columns))).collect();
-    (0..values.len()).map(|i| found.get(i / width / STEP * columns + i % width / STEP).copied().flatten()).collect()
+    let of = |(i, value): (usize, &Option<f64>)| {
+        value.and_then(|_| found.get(i / width / STEP * columns + i % width / STEP).copied().flatten())
+    };
+    values.iter().enumerate().map(of).collect()
 }
 
 /// The Fourier transform of each row, laid out as columns.
@@ -70,9 +80,15 @@ mod tests {
             // A Hann window widens a line by 1.5 bins or so.
             let middle = found[32 * 96 + 40].unwrap();
             assert!((middle - expected).abs() < 2.0 / WINDOW as f64, "{middle} for {f:?}");
-            // Near the border and where the image ends nothing is known.
-            assert!([3 * 96 + 40, 32 * 96 + 84, 32 * 96 + 4].iter().all(|i| found[*i].is_none()));
+            // Near the border and without a value nothing is known.
+            assert!([3 * 96 + 40, 32 * 96 + 92, 32 * 96 + 4].iter().all(|i| found[*i].is_none()));
+            // A window with a part missing has nearly the same.
+            let cut: Vec<_> = image.iter().enumerate().map(|(i, v)| v.filter(|_| i % 96 < 46)).collect();
+            let cut = map(&cut, 96)[32 * 96 + 40].unwrap();
+            assert!((cut - expected).abs() < 0.1, "{cut} for {f:?}");
         }
-        assert_eq!(bandwidth(&[1.0; WINDOW * WINDOW]), 0.0);
+        assert_eq!(bandwidth(&[Some(1.0); WINDOW * WINDOW]), Some(0.0));
+        let half: Vec<_> = (0..WINDOW * WINDOW).map(|i| (i < 400).then_some(i as f64)).collect();
+        assert_eq!(bandwidth(&half), None);
     }
 }

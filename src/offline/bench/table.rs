@@ -43,7 +43,8 @@ pub struct Line {
     pub mis_alone: Option<Gained>,
     /// Both: the predicted rate with mis against full rate with brdf-random, which is what the paper compared with.
     pub together: Option<Gained>,
-    /// The best of the default and the other settings, at equal error, with mis on both sides.
+    /// The best of the default and the other settings, at equal error, with mis on both sides; absent if all that is known are
+    /// upper bounds.
     pub best: Option<Best>,
     /// Time of the passes that full rate does not need, over full rate's frame time.
     pub overhead: f64,
@@ -97,7 +98,9 @@ fn line(scene: &SceneReport, directions: u32) -> Option<Line> {
     let over_full = |row: &Row| ratio_of_medians(&row.rounds_ms, &full.rounds_ms);
     let settings = scene.variants.iter().filter(|r| r.part == Part::Setting && r.name.ends_with(&format!(" {directions}")));
     let candidate = |row: &Row| Some(Best { variant: row.name.clone(), gained: gained(Some(row), "mis")? });
-    let best = settings.chain([adaptive]).filter_map(candidate);
+    // What gains at most so much may gain less than another.
+    let found = |best: &Best| best.gained.speed_up.is != Is::AtMost;
+    let best = settings.chain([adaptive]).filter_map(candidate).filter(found);
     let passes: Vec<Pass> = adaptive.passes.iter().map(|p| Pass { name: p.name, ms: p.ms.median }).collect();
     let extra: f64 = passes.iter().filter(|p| OVERHEAD.contains(&p.name)).map(|p| p.ms).sum();
     Some(Line {
