@@ -197,7 +197,7 @@ pub fn targets(scenes: &[SceneReport], lines: &[Line]) -> Vec<Target> {
         median("speed-up at equal rmse, glossy on smooth meshes", 1.8, &equal, &smooth),
         median("speed-up at equal rmse, all", 1.8, &equal, &|_| true),
         median("speed-up at equal rmse, brdf-random on both sides, no sun", 3.0, &|l| l.random, &|l| {
-            case(l).is_none_or(|c| c.environment != SUN)
+            case(l).is_some_and(|c| c.environment != SUN)
         }),
         extreme("full rate's frame time over the predicted one's, least of all scenes", 64, 0.97, true, &unhurried),
         extreme("full rate's frame time over the predicted one's, least of all scenes", 256, 0.97, true, &unhurried),
