@@ -232,7 +232,8 @@ fn statistics_and_layers_say_what_was_drawn() {
     let device = Options { device: Some("llvmpipe".into()), validate: true };
     for allocation in [Allocation::Constant, Allocation::Equation8, Allocation::Deviation] {
         let aovs = vec![Aov::Samples, Aov::Shaded];
-        let base = Settings { rate: Rate::Bandwidth.into(), allocation, samples: 32, aovs, ..Settings::new([160, 120]) };
+        let config = Config { rate: Rate::Bandwidth, allocation, directions: 32, ..Config::new([160, 120]) };
+        let base = Settings { aovs, ..Settings::new(config) };
         let rendered = render(&world, &Settings { device: device.clone(), ..base }, &mut |_, _| {}).unwrap();
         let layer = |name| rendered.image.channel(name).unwrap().iter().map(|v| f64::from(*v)).collect::<Vec<_>>();
         let (drawn, shaded) = (layer("samples.Y"), layer("shaded.Y"));

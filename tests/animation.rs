@@ -6,7 +6,6 @@ use passband::offline::animation::AnimatedWorld;
 use passband::offline::error::{At, Error};
 use passband::offline::headless::{Headless, Options};
 use passband::offline::image_io::{LinearImage, read_exr};
-use passband::offline::rates;
 use passband::offline::render::{Settings, render};
 use passband::offline::scene::Scene;
 use passband::offline::sequence::render_frames;
@@ -154,8 +153,8 @@ fn what_cannot_be_is_refused_with_its_line() {
     assert!(error.to_string().contains("without a transform"), "{error}");
 }
 
-fn settings(rate: impl Into<rates::Rate>) -> Settings {
-    Settings { rate: rate.into(), samples: 8, device: device(), ..Settings::new([72, 48]) }
+fn settings(rate: Rate) -> Settings {
+    Settings { device: device(), ..Settings::new(Config { rate, directions: 8, ..Config::new([72, 48]) }) }
 }
 
 /// The images of `frames`, in order, and the statistics.
@@ -173,8 +172,8 @@ fn frames(world: &mut AnimatedWorld, settings: &Settings, frames: Range<u32>) ->
 
 #[test]
 fn a_frame_is_the_same_alone_and_among_others_and_a_plain_render_is_the_first() {
-    let rates = [Rate::Full.into(), Rate::Bandwidth.into(), Rate::Uniform(1).into(), rates::Rate::Oracle];
-    for rate in rates {
+    for rate in [Rate::Full, Rate::Bandwidth, Rate::Uniform(1), Rate::Given] {
+        let settings = |rate| Settings { oracle: rate == Rate::Given, ..settings(rate) };
         let mut world = load(MOVING).unwrap();
         let (all, _) = frames(&mut world, &settings(rate), 0..4);
         for pair in all.windows(2) {
@@ -183,17 +182,17 @@ fn a_frame_is_the_same_alone_and_among_others_and_a_plain_render_is_the_first() 
         // Timed frames are the same frames.
         let timed = Settings { timed: true, ..settings(rate) };
         let (alone, stats) = frames(&mut world, &timed, 2..3);
-        assert!(alone[0].channels == all[2].channels, "{}", rate.name());
+        assert!(alone[0].channels == all[2].channels, "{rate:?}");
         assert!(stats.frame_ms.median > 0.0 && stats.setup_ms["animation"] > 0.0 && stats.pixels.shaded > 0);
         world.show(0);
         let plain = render(world.world(), &settings(rate), &mut |_, _| {}).unwrap();
-        assert!(plain.image.channels == all[0].channels, "{}", rate.name());
+        assert!(plain.image.channels == all[0].channels, "{rate:?}");
     }
     // What follows the frame before does so whether frames are timed or not.
     let mut world = load(MOVING).unwrap();
-    let luminance = settings(rates::Rate::Own(passband::Rate::Luminance));
+    let luminance = settings(Rate::Luminance);
     let (plain, _) = frames(&mut world, &luminance, 1..4);
-    let (timed, _) = frames(&mut world, &Settings { timed: true, ..luminance }, 1..4);
+    let (timed, _) = frames(&mut world, &Settings { timed: true, ..luminance.clone() }, 1..4);
     assert!(plain.iter().zip(&timed).all(|(a, b)| a.channels == b.channels));
 }
 
@@ -229,7 +228,9 @@ fn no_frame_of_the_built_in_animation_has_a_hole_or_shades_more_than_all() {
     let mut world = Scene::load("waves", &[]).unwrap().animated().unwrap();
     let last = world.frames().unwrap();
     for first in [0, last / 3, last - 2] {
-        let settings = Settings { timed: true, extent: [128, 96], samples: 64, ..settings(Rate::Bandwidth) };
+        let plain = settings(Rate::Bandwidth);
+        let config = Config { extent: [128, 96], directions: 64, ..plain.config.clone() };
+        let settings = Settings { timed: true, config, ..plain };
         let (images, stats) = frames(&mut world, &settings, first..first + 2);
         assert!(stats.pixels.shaded <= stats.pixels.covered, "{:?}", stats.pixels);
         for image in images {

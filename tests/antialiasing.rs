@@ -80,7 +80,7 @@ fn samples_of_a_pixel_are_shaded_at_edges_or_where_the_bandwidth_asks() {
 fn statistics_count_levels_and_the_directions_that_they_share() {
     let world = scene("sphere");
     let stats = |rate: Rate, side| {
-        let settings = Settings { rate: rate.into(), samples_per_side: side, ..Settings::new([64; 2]) };
+        let settings = Settings::new(Config { rate, samples_per_side: side, ..Config::new([64; 2]) });
         render::render(&world, &settings, &mut |_, _| ()).unwrap().stats
     };
     for (side, directions) in [(2, &[(-1, 32), (0, 128)][..]), (4, &[(-2, 16), (-1, 64), (0, 256)])] {

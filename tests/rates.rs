@@ -6,11 +6,11 @@ mod support;
 use passband::frequency::luminance::{NOTICEABLE, levels as by_contrast};
 use passband::offline::headless::Options;
 use passband::offline::levels;
-use passband::offline::rates::{Rate, oracle};
-use passband::{Config, Rate as Own};
+use passband::offline::rates::{self, oracle};
+use passband::{Config, Rate};
 use support::{scene, session};
 
-fn config(rate: Own) -> Config {
+fn config(rate: Rate) -> Config {
     Config { frames_in_flight: 1, rate, ..Config::new([160, 120]) }
 }
 
@@ -19,8 +19,9 @@ fn the_oracle_shades_less_than_bandwidth_at_no_more_error() {
     let device = Options { device: Some("llvmpipe".into()), validate: true };
     for name in ["torus-knot", "trio"] {
         let world = scene(name);
-        let config = config(Own::Given);
-        let (oracle, bandwidth) = oracle::of(&world, &config, &device, 0).unwrap();
+        let config = config(Rate::Given);
+        let bandwidth = oracle::predicted(&world, &config, &device, 0).unwrap();
+        let oracle = oracle::converged(&world, &config, &device, 0).unwrap();
         let predicted = oracle.outcome(&bandwidth);
         let (best, expected) = oracle.cheapest(predicted.error);
         assert_eq!(oracle.outcome(&best), expected);
@@ -44,10 +45,10 @@ fn the_oracle_shades_less_than_bandwidth_at_no_more_error() {
 #[test]
 fn contrast_of_the_frame_before_steers_luminance() {
     let world = scene("trio");
-    let config = config(Own::Luminance);
+    let config = config(Rate::Luminance);
     let mut session = session(&world, &config);
     let device = Options { device: Some("llvmpipe".into()), validate: true };
-    Rate::from(Own::Luminance).prepare(&mut session, &world, &config, &device, 0).unwrap();
+    rates::prepare(&mut session, &world, &config, false, &device, 0).unwrap();
     session.frame([0, 0]).unwrap();
     let shaded = levels::shaded(&mut session).unwrap();
     let surface = support::surface(&mut session, &world, &config);
@@ -69,7 +70,7 @@ fn contrast_of_the_frame_before_steers_luminance() {
 fn levels_by_contrast_are_the_twins() {
     for (extent, side) in [([160, 120], 1), ([93, 67], 1), ([61, 35], 2), ([8, 3], 4)] {
         let world = scene("trio");
-        let config = Config { extent, samples_per_side: side, directions: 16, ..config(Own::Luminance) };
+        let config = Config { extent, samples_per_side: side, directions: 16, ..config(Rate::Luminance) };
         let mut session = session(&world, &config);
         session.frame([0, 0]).unwrap();
         let level = |session: &mut passband::offline::session::Session| -> Vec<u32> {

@@ -421,13 +421,15 @@ fn builtin_scenes_resolve() {
 fn settings_reach_the_frame() {
     use passband::frequency::operators::{Combine, Operator};
     let load = |settings: &str| load_text(&with("material", &format!("[settings]\n{settings}")), &[]).unwrap();
-    assert_eq!(load("operator = 'box'").operator(), Operator::Box);
-    assert_eq!(load("operator = 'clipped'").operator(), Operator::Clipped);
-    assert_eq!(load("operator = 'covariance'").operator(), Operator::Covariance);
-    assert_eq!(load("combine = 'mean'").combine(), Combine::Mean);
-    assert_eq!(load("combine = 'max'").combine(), Combine::Max);
-    assert_eq!((load("lmax = 5").lmax(), load("geometric = true").geometric()), (Some(5), true));
-    assert_eq!((load("eps = 0.02").eps(), load("").eps()), (Some(0.02), None));
+    let load = |settings: &str| load(settings).config([64, 64]);
+    assert_eq!(load("operator = 'box'").operator, Operator::Box);
+    assert_eq!(load("operator = 'clipped'").operator, Operator::Clipped);
+    assert_eq!(load("operator = 'covariance'").operator, Operator::Covariance);
+    assert_eq!(load("combine = 'mean'").combine, Combine::Mean);
+    assert_eq!(load("combine = 'max'").combine, Combine::Max);
+    assert_eq!((load("lmax = 5").lmax, load("geometric = true").geometric), (5, true));
+    assert_eq!((load("eps = 0.02").eps, load("").eps), (0.02, 0.01));
+    assert_eq!((load("budget = 32").directions, load("np_rule = 'sqrt'").allocation.name()), (32, "sqrt"));
     let none = load("");
-    assert_eq!((none.operator(), none.combine(), none.lmax(), none.geometric()), (Operator::Clipped, Combine::Mean, None, false));
+    assert_eq!((none.operator, none.combine, none.lmax, none.geometric), (Operator::Clipped, Combine::Mean, 3, false));
 }

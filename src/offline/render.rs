@@ -1,18 +1,17 @@
 //! A still image of a world, with its layers and statistics.
 
 use crate::frequency::allocation::Allocation;
-use crate::frequency::operators::{Combine, Operator};
 use crate::gpu::timer::FrameTimings;
 use crate::offline::aov::Aov;
 use crate::offline::error::Result;
 use crate::offline::headless::{Headless, Options};
 use crate::offline::image_io::LinearImage;
 use crate::offline::levels;
-use crate::offline::rates::Rate;
+use crate::offline::rates;
 use crate::offline::session::Session;
 use crate::offline::stats::{Pixels, Quantiles, Samples, Stats, pass_times};
 use crate::offline::world::World;
-use crate::{Config, Estimator, Filter, Requirements};
+use crate::{Config, Estimator, Filter, Rate, Requirements};
 use serde_json::json;
 use std::collections::BTreeMap;
 
@@ -24,41 +23,17 @@ pub(super) const TIMED: u32 = 5;
 const REFERENCE_CHUNK: u32 = 1024;
 
 /// What to render.
-#[derive(Clone, Debug)]
+#[derive(Clone)]
 pub struct Settings {
-    /// Output pixels.
-    pub extent: [u32; 2],
-    /// Where samples are shaded.
-    pub rate: Rate,
-    /// Coarsest level, in output pixels; `None` is the default.
-    pub lmax: Option<u32>,
-    /// Directions in which the prediction of bandwidth looks.
-    pub probes: u32,
-    /// Samples that a predicted cycle gets; `None` is the rule.
-    pub samples_per_cycle: Option<f32>,
-    /// What the prediction takes for reflection.
-    pub operator: Operator,
-    /// How it combines its probes.
-    pub combine: Combine,
-    /// Details below this share of the largest do not count in its analyses.
-    pub eps: f64,
-    /// How materials are read.
-    pub filter: Filter,
-    /// Whether the mesh's curvature widens lobes, whatever the filter.
-    pub geometric: bool,
-    /// Directions a shaded sample; with several a pixel as [`Config::directions`] says.
-    pub samples: u32,
-    /// How shaded samples share them; `samples` is the mean.
-    pub allocation: Allocation,
-    /// Estimator.
-    pub estimator: Estimator,
-    /// Shading samples a side of a pixel.
-    pub samples_per_side: u32,
+    /// What the renderer is built for.
+    pub config: Config,
+    /// Whether the levels of [`Rate::Given`] are the oracle's.
+    pub oracle: bool,
     /// Seed of the sample points.
     pub seed: u32,
     /// Extra layers.
     pub aovs: Vec<Aov>,
-    /// Directions a pixel of a converged image instead, with the default estimator.
+    /// Directions a pixel of a converged image instead, at the full rate with the default estimator.
     pub reference: Option<u32>,
     /// Whether to time frames.
     pub timed: bool,
@@ -67,34 +42,9 @@ pub struct Settings {
 }
 
 impl Settings {
-    /// Defaults for an image of `extent` pixels: full rate, 64 directions, one sample a pixel, nothing beside it.
-    pub fn new(extent: [u32; 2]) -> Self {
-        let base = Config::new(extent);
-        Self {
-            extent,
-            rate: base.rate.into(),
-            lmax: None,
-            probes: base.probes,
-            samples_per_cycle: base.samples_per_cycle,
-            operator: base.operator,
-            combine: base.combine,
-            eps: base.eps,
-            filter: base.filter,
-            geometric: base.geometric,
-            samples: base.directions,
-            allocation: base.allocation,
-            estimator: base.estimator,
-            samples_per_side: base.samples_per_side,
-            seed: 0,
-            aovs: Vec::new(),
-            reference: None,
-            timed: false,
-            device: Options::default(),
-        }
-    }
-
-    pub(super) fn rate(&self) -> Rate {
-        if self.reference.is_some() { crate::Rate::Full.into() } else { self.rate }
+    /// One frame of `config` with nothing beside it.
+    pub fn new(config: Config) -> Self {
+        Self { config, oracle: false, seed: 0, aovs: Vec::new(), reference: None, timed: false, device: Options::default() }
     }
 
     /// Frames of the renderer that make one image.
@@ -102,25 +52,34 @@ impl Settings {
         self.reference.map_or(1, |n| n.div_ceil(REFERENCE_CHUNK))
     }
 
+    /// Brings a session of [`Self::config`] to where its first frame can follow.
+    pub(super) fn prepare(&self, session: &mut Session, world: &World, config: &Config) -> Result<()> {
+        rates::prepare(session, world, config, self.oracle && config.rate == Rate::Given, &self.device, self.seed)
+    }
+
+    /// The configuration in force: each frame is waited for, and a reference is its own.
     pub(crate) fn config(&self) -> Config {
-        let base = Config::new(self.extent);
-        Config {
-            samples_per_side: self.samples_per_side,
+        let base = Config {
             frames_in_flight: 1,
-            estimator: if self.reference.is_some() { Estimator::Mis } else { self.estimator },
-            rate: self.rate().of_renderer(),
-            lmax: self.lmax.unwrap_or(base.lmax),
-            probes: self.probes,
-            samples_per_cycle: self.samples_per_cycle,
-            operator: self.operator,
-            combine: self.combine,
-            eps: self.eps,
-            filter: self.filter,
-            geometric: self.geometric,
-            directions: self.reference.map_or(self.samples, |n| n.min(REFERENCE_CHUNK)),
-            allocation: if self.reference.is_some() { Allocation::Constant } else { self.allocation },
-            curvature: self.aovs.iter().any(|a| a.needs_curvature()),
-            ..base
+            curvature: self.config.curvature || self.aovs.iter().any(|a| a.needs_curvature()),
+            ..self.config.clone()
+        };
+        let Some(directions) = self.reference else { return base };
+        let (rate, estimator, allocation) = (Rate::Full, Estimator::Mis, Allocation::Constant);
+        Config { rate, estimator, allocation, directions: directions.min(REFERENCE_CHUNK), ..base }
+    }
+
+    /// As `--rate` calls it.
+    fn rate(&self) -> &'static str {
+        match self.config().rate {
+            Rate::Full => "full",
+            Rate::Uniform(1) => "half",
+            Rate::Uniform(2) => "quarter",
+            Rate::Uniform(_) => "uniform",
+            Rate::Bandwidth => "bandwidth",
+            Rate::Luminance => "luminance",
+            Rate::Given if self.oracle => "oracle",
+            Rate::Given => "given",
         }
     }
 }
@@ -139,8 +98,7 @@ pub struct Rendered {
 /// [`crate::offline::error::Error`] of the settings, the device or the driver.
 pub fn render(world: &World, settings: &Settings, progress: &mut dyn FnMut(u32, u32)) -> Result<Rendered> {
     let (mut session, config) = open(world, settings)?;
-    let rate = settings.rate();
-    rate.prepare(&mut session, world, &config, &settings.device, settings.seed)?;
+    settings.prepare(&mut session, world, &config)?;
     let chunks = settings.chunks();
     let total = chunks + if settings.timed { WARM_UP + TIMED } else { 0 };
     let mut done = 0;
@@ -190,7 +148,7 @@ pub(super) fn image(
         sum.iter_mut().zip(&values).for_each(|(s, v)| *s += f64::from(*v));
     }
     let channel = |c: usize| sum.iter().skip(c).step_by(4).map(|s| (s / f64::from(chunks)) as f32).collect();
-    let [width, height] = settings.extent;
+    let [width, height] = config.extent;
     let mut channels: Vec<_> = ["R", "G", "B", "A"].iter().enumerate().map(|(c, n)| (n.to_string(), channel(c))).collect();
     for aov in &settings.aovs {
         channels.extend(aov.read(session, config)?);
@@ -243,7 +201,7 @@ pub(super) fn report(
         Estimator::Lookup => "lookup",
     };
     let values = BTreeMap::from([
-        ("rate", json!(settings.rate().name())),
+        ("rate", json!(settings.rate())),
         ("lmax", json!(config.lmax)),
         ("filter", json!(if config.filter == Filter::Tk { "tk" } else { "point" })),
         ("probes", json!(config.probes)),
@@ -263,7 +221,7 @@ pub(super) fn report(
         schema: 1,
         device: session.headless().info().clone(),
         scene: world.name.clone(),
-        extent: settings.extent,
+        extent: config.extent,
         settings: values,
         pixels,
         samples: Samples { taken, budget },

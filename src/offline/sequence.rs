@@ -3,7 +3,6 @@
 use crate::offline::animation::AnimatedWorld;
 use crate::offline::error::{Error, Result};
 use crate::offline::image_io::LinearImage;
-use crate::offline::rates::Rate;
 use crate::offline::render::{Settings, TIMED, WARM_UP, counts, image, open, report};
 use crate::offline::stats::{Pixels, Stats};
 use serde_json::json;
@@ -12,7 +11,7 @@ use std::ops::Range;
 use std::time::Instant;
 
 /// Renders `frames` of `world` in order and hands each to `write`. A frame does not depend on those before it, except at
-/// [`Rate::Luminance`], which looks at the one before. In the statistics, times are those of all frames (at least five, the
+/// [`crate::Rate::Luminance`], which looks at the one before. In the statistics, times are those of all frames (at least five, the
 /// last one being repeated) and counts the means over them; `setup_ms` holds the animation's work on the CPU and all uploads.
 /// `progress` is told how many of how many frames of the renderer are done.
 ///
@@ -30,7 +29,7 @@ pub fn render_frames(
         let expected = format!("A..B with A below B and B at most {most}");
         return Err(Error::argument("frames", expected, format!("{}..{}", frames.start, frames.end)));
     }
-    let (rate, chunks) = (settings.rate(), settings.chunks());
+    let chunks = settings.chunks();
     let drawn = (frames.end - frames.start).saturating_mul(chunks);
     let repeated = if settings.timed { 1 + TIMED.saturating_sub(drawn) } else { 0 };
     let warm_up = if settings.timed { WARM_UP } else { 0 };
@@ -50,8 +49,8 @@ pub fn render_frames(
             show(world, number);
             session.show(world.world())?;
         }
-        if number == frames.start || rate == Rate::Oracle {
-            rate.prepare(&mut session, world.world(), &config, &settings.device, settings.seed)?;
+        if number == frames.start || settings.oracle {
+            settings.prepare(&mut session, world.world(), &config)?;
         }
         if number == frames.start {
             for warm_up in 1..=warm_up {

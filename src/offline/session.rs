@@ -105,6 +105,7 @@ pub struct Session {
     meshes: HashMap<usize, MeshBuffers>,
     shown: Shown,
     setup: SetupTimes,
+    record_ms: f64,
 }
 
 impl Session {
@@ -143,8 +144,8 @@ impl Session {
         setup.push((crate::pass::environment::NAME, milliseconds(clock)));
 
         let clock = Instant::now();
-        let mut session =
-            Self { headless, renderer: Some(renderer), meshes: HashMap::new(), shown: Shown::of(world, config.extent), setup };
+        let shown = Shown::of(world, config.extent);
+        let mut session = Self { headless, renderer: Some(renderer), meshes: HashMap::new(), shown, setup, record_ms: 0.0 };
         session.upload_objects(world, &mut HashMap::new())?;
         session.setup.push((MESHES, milliseconds(clock)));
         Ok(session)
@@ -237,11 +238,21 @@ impl Session {
     pub fn frame(&mut self, seed: [u32; 2]) -> Result<()> {
         let inputs = self.shown.inputs(seed);
         let renderer = self.renderer.as_mut().ok_or_else(closed)?;
+        let mut record_ms = 0.0;
         self.headless.submit(|cmd, _| {
+            let clock = Instant::now();
             // SAFETY: every submission is waited for, so slot 0 is always free; the buffers live as long as the session.
             unsafe { renderer.record(cmd, &inputs) }?;
+            record_ms = milliseconds(clock);
             Ok(Retired::default())
-        })
+        })?;
+        self.record_ms = record_ms;
+        Ok(())
+    }
+
+    /// CPU milliseconds that [`crate::Renderer::record`] took for the last frame.
+    pub fn record_ms(&self) -> f64 {
+        self.record_ms
     }
 
     /// Gives the frames of [`crate::Rate::Given`] the level of each sample, row by row.

@@ -2,11 +2,10 @@
 
 use glam::{DVec2, DVec3};
 use passband::frequency::operators::{Operator, Surface, pixel_angle};
+use passband::offline::bench::spectrum::{WINDOW, bandwidth};
 use passband::offline::world::Camera;
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::TAU;
 
-/// Pixels a side of a window.
-const WINDOW: usize = 32;
 /// Cycles/pixel below which the window's own spectrum is what is measured, and above which pixels alias.
 const RANGE: [f64; 2] = [0.07, 0.45];
 
@@ -48,7 +47,7 @@ pub fn ratios(k: f64, size: usize) -> Vec<f64> {
             if window.iter().any(|(_, b)| *b > RANGE[1]) {
                 continue;
             }
-            let measured = bandwidth(&window.iter().map(|w| w.0).collect::<Vec<_>>());
+            let measured = bandwidth(&window.iter().map(|w| Some(w.0)).collect::<Vec<_>>()).expect("the whole window has values");
             let (_, predicted) = window[WINDOW / 2 * WINDOW + WINDOW / 2];
             if measured >= RANGE[0] {
                 ratios.push(predicted / measured);
@@ -57,37 +56,4 @@ pub fn ratios(k: f64, size: usize) -> Vec<f64> {
     }
     ratios.sort_by(f64::total_cmp);
     ratios
-}
-
-/// The radius in cycles/pixel that holds 95 % of the power of a window without its mean, under a Hann window.
-fn bandwidth(values: &[f64]) -> f64 {
-    let hann = |i: usize| 0.5 - 0.5 * (TAU * (i as f64 + 0.5) / WINDOW as f64).cos();
-    let weight = |i: usize| hann(i % WINDOW) * hann(i / WINDOW);
-    let (sum, weights) = values.iter().enumerate().fold((0.0, 0.0), |(s, w), (i, v)| (s + v * weight(i), w + weight(i)));
-    let plain: Vec<DVec2> = values.iter().enumerate().map(|(i, v)| DVec2::new((v - sum / weights) * weight(i), 0.0)).collect();
-    // Rows, then columns.
-    let spectrum = transposed_transform(&transposed_transform(&plain));
-    let frequency = |i: usize| if i > WINDOW / 2 { i as f64 - WINDOW as f64 } else { i as f64 } / WINDOW as f64;
-    let mut power: Vec<_> = (spectrum.iter().enumerate())
-        .map(|(i, c)| (frequency(i % WINDOW).hypot(frequency(i / WINDOW)), c.length_squared()))
-        .collect();
-    power.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let total: f64 = power.iter().map(|p| p.1).sum();
-    let mut below = 0.0;
-    power
-        .iter()
-        .find(|(_, p)| {
-            below += p;
-            below >= 0.95 * total
-        })
-        .map_or(0.0, |(f, _)| *f)
-}
-
-/// The Fourier transform of each row, laid out as columns.
-fn transposed_transform(values: &[DVec2]) -> Vec<DVec2> {
-    let term = |row: usize, f: usize, x: usize| {
-        let (sin, cos) = (-2.0 * PI * (f * x % WINDOW) as f64 / WINDOW as f64).sin_cos();
-        DVec2::new(cos, sin).rotate(values[row * WINDOW + x])
-    };
-    (0..WINDOW * WINDOW).map(|i| (0..WINDOW).map(|x| term(i % WINDOW, i / WINDOW, x)).sum()).collect()
 }

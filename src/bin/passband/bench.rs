@@ -1,7 +1,9 @@
 //! `passband bench`: variants of a frame measured side by side.
 
+use crate::sheet;
 use clap::ValueEnum;
 use indicatif::{ProgressBar, ProgressStyle};
+use passband::offline::bench::figures::Figure;
 use passband::offline::bench::report::Report;
 use passband::offline::bench::{reference, suites};
 use passband::offline::error::{Error, Result};
@@ -43,9 +45,12 @@ pub struct Args {
     /// Write everything that was found
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
-    /// Write a plot of error over time for each scene into this folder
+    /// Write plots of error over time and over shaded pixels into this folder, one for each scene
     #[arg(long, value_name = "FOLDER")]
     plots: Option<PathBuf>,
+    /// Write figures 6, 11, 12, 14 and 15 of Bagher et al. 2011 into this folder, of each scene of the quick preset or named here
+    #[arg(long, value_name = "FOLDER")]
+    figures: Option<PathBuf>,
     /// Write a page to look at
     #[arg(long, value_name = "FILE.html")]
     report: Option<PathBuf>,
@@ -100,7 +105,8 @@ impl Args {
                 return Err(Error::NotSupportedYet { what: "--suite xu, tan, residual, joined, scaling and all".into() });
             }
         };
-        later(self.plots.is_some() && suite != suites::Suite::Bagher, "--plots of a suite without errors")?;
+        let pictured = self.plots.is_some() || self.figures.is_some();
+        later(pictured && suite != suites::Suite::Bagher, "--plots and --figures of a suite without errors")?;
         Ok(suites::Order {
             suite,
             preset: match self.preset {
@@ -109,6 +115,7 @@ impl Args {
             },
             rounds: self.rounds,
             extent: self.size,
+            curves: self.plots.is_some(),
             scenes: self.scenes.clone(),
             device: Options { device: self.device.clone(), validate: false },
             root: PathBuf::new(),
@@ -124,12 +131,21 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     if let Some(path) = &args.json {
         check_writable(path)?;
     }
-    if let Some(folder) = &args.plots {
+    for folder in args.plots.iter().chain(&args.figures) {
         std::fs::create_dir_all(folder).map_err(|e| Error::Write { path: folder.clone(), reason: e.to_string() })?;
     }
     let style = ProgressStyle::with_template("{msg} {bar:30} {pos}/{len} {eta}").unwrap_or_else(|_| ProgressStyle::default_bar());
     let bar = ProgressBar::new(1).with_style(style);
-    let report = suites::run(&order, &mut |what, done, total| {
+    let mut drawn = Vec::new();
+    let mut keep = |scene: &str, figure: Figure| {
+        let Some(folder) = &args.figures else { return Ok(()) };
+        let path = folder.join(format!("{}-{}.png", file_stem(scene), figure.name));
+        sheet::contact(&path, &figure.title, figure.columns, &figure.tiles)?;
+        drawn.push(path);
+        Ok(())
+    };
+    let keep: Option<&mut suites::Keep<'_>> = if args.figures.is_some() { Some(&mut keep) } else { None };
+    let report = suites::run(&order, keep, &mut |what, done, total| {
         if bar.message() != what {
             // The time left is of each step alone.
             bar.reset_eta();
@@ -143,6 +159,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     if let Some(folder) = &args.plots {
         plots(folder, &report)?;
     }
+    drawn.iter().try_for_each(|path| crate::print(format_args!("figure: {}", path.display())))?;
     if let Some(path) = &args.json {
         let text = serde_json::to_string_pretty(&report).map_err(|e| Error::argument("--json", "numbers", e))?;
         write_atomically(path, |file| file.write_all(text.as_bytes()))?;
@@ -150,10 +167,14 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
+/// A scene file's stem may hold anything but separators.
+fn file_stem(scene: &str) -> String {
+    scene.replace(' ', "-")
+}
+
 fn plots(folder: &Path, report: &Report) -> Result<()> {
     for scene in &report.scenes {
-        // A scene file's stem may hold anything but separators.
-        let path = folder.join(format!("{}.png", scene.name.replace(' ', "-")));
+        let path = folder.join(format!("{}.png", file_stem(&scene.name)));
         plot::write(&path, scene)?;
         crate::print(format_args!("plot: {}", path.display()))?;
     }

@@ -1,23 +1,27 @@
-//! Rate and distortion: error over frame time and over directions, one curve a way of shading.
+//! Rate and distortion: error over frame time, over directions and over shaded pixels, one curve a way of shading.
 
 use crate::sheet::{self, Area, Drawn, legend};
+use passband::offline::bench::curves::Curve as Without;
 use passband::offline::bench::report::{Row, SceneReport};
+use passband::offline::bench::runner::Part;
 use passband::offline::error::Result;
 use plotters::prelude::*;
 use std::path::Path;
 
-const SIZE: (u32, u32) = (1600, 760);
+const SIZE: (u32, u32) = (2100, 760);
 /// Told apart in grey too.
-const COLOURS: [RGBColor; 6] = [
+const COLOURS: [RGBColor; 8] = [
     RGBColor(20, 40, 110),
     RGBColor(230, 160, 40),
     RGBColor(40, 150, 90),
     RGBColor(200, 60, 40),
     RGBColor(120, 190, 220),
     RGBColor(140, 80, 160),
+    RGBColor(150, 150, 60),
+    RGBColor(90, 90, 90),
 ];
 
-/// The curves of one way of shading at several numbers of directions.
+/// One way of shading at several numbers of directions.
 struct Curve<'a> {
     name: &'a str,
     rows: Vec<&'a Row>,
@@ -26,7 +30,7 @@ struct Curve<'a> {
 /// Draws the variants of `scene` and writes them as a PNG.
 pub fn write(path: &Path, scene: &SceneReport) -> Result<()> {
     let mut curves: Vec<Curve<'_>> = Vec::new();
-    for row in scene.variants.iter().filter(|row| row.error.is_some()) {
+    for row in scene.variants.iter().filter(|row| row.part == Part::Compared && row.error.is_some()) {
         let name = row.name.rsplit_once(' ').map_or(row.name.as_str(), |(name, _)| name);
         match curves.iter_mut().find(|c| c.name == name) {
             Some(curve) => curve.rows.push(row),
@@ -39,11 +43,45 @@ pub fn write(path: &Path, scene: &SceneReport) -> Result<()> {
     let noise = scene.reference.as_ref().map_or(0.0, |r| r.noise.rmse);
     let title = format!("{}, {}x{}", scene.name, scene.extent[0], scene.extent[1]);
     sheet::write(path, SIZE, &title, |root| {
-        let panels = root.split_evenly((1, 2));
-        let [time, rate] = panels.as_slice() else { return Err("the sheet has two panels".into()) };
+        let panels = root.split_evenly((1, 3));
+        let [time, rate, shaded] = panels.as_slice() else { return Err("the sheet has three panels".into()) };
         panel(time, "frame, ms", &curves, noise, |row| row.frame_ms.median)?;
-        panel(rate, "directions a covered pixel", &curves, noise, Row::directions)
+        panel(rate, "directions a covered pixel: N times the shaded share", &curves, noise, Row::directions)?;
+        reconstruction(shaded, &curves, &scene.curves)
     })
+}
+
+/// Error without noise over shaded pixels.
+fn reconstruction(area: &Area<'_>, known: &[Curve<'_>], curves: &[Without]) -> Drawn {
+    let points = || curves.iter().flat_map(|c| &c.points);
+    let height = around(points().map(|p| p.error));
+    let mut chart = ChartBuilder::on(area)
+        .margin(14)
+        .x_label_area_size(48)
+        .y_label_area_size(84)
+        .build_cartesian_2d(0.0..105.0, height.clone().log_scale())?;
+    chart
+        .configure_mesh()
+        .light_line_style(WHITE)
+        .label_style(("sans-serif", 18))
+        .axis_desc_style(("sans-serif", 20))
+        .x_labels(6)
+        .x_desc("shaded pixels, % of the covered ones")
+        .y_desc("RMS error as displayed, of reconstruction alone")
+        .y_label_formatter(&number)
+        .draw()?;
+    for curve in curves {
+        // The same colours as beside it.
+        let place = known.iter().position(|c| c.name == curve.rate).unwrap_or(known.len());
+        let colour = COLOURS[place % COLOURS.len()];
+        // What has no error at all stands on the axis.
+        let shown = curve.points.iter().map(|p| (100.0 * p.shaded_fraction, p.error.max(height.start)));
+        chart
+            .draw_series(LineSeries::new(shown, colour.filled().stroke_width(3)).point_size(5))?
+            .label(curve.rate)
+            .legend(move |(x, y)| PathElement::new([(x, y), (x + 24, y)], colour.stroke_width(3)));
+    }
+    legend(&mut chart, SeriesLabelPosition::UpperRight)
 }
 
 fn error(row: &Row) -> f64 {

@@ -1,5 +1,8 @@
 //! A bench's report as tables on the terminal.
 
+#[path = "bench_gains.rs"]
+mod gains;
+
 use comfy_table::{CellAlignment, Table, presets};
 use passband::offline::bench::cases::Half;
 use passband::offline::bench::equal::{Equal, Is};
@@ -8,8 +11,15 @@ use passband::offline::bench::statistics::{Ratio, Summary};
 
 const LEGEND: &str = "of the first's: frame time over the first variant's, with its 95 % interval
 speed-up: over full rate with mis where that has the same rmse, with its interval; at PSNR: where it has the same PSNR
-error: rmse over that of full rate with mis in the same time; of its own: speed-up over full rate with the same estimator
+error: rmse over that of full rate with mis in the same time; over random: speed-up over full rate with brdf-random
 < and > are bounds: full rate was not measured further";
+
+/// What the table of gains has in its columns.
+const COLUMNS: &str = "Full rate against the predicted rate with as many directions (Bagher et al. 2011, figure 13)
+equal N: full over predicted frame time, and predicted over full rmse there; equal rmse: full over predicted frame time where full
+rate has the predicted one's rmse, which is adaptivity's gain alone; best: the same of the best setting of each scene; random: of
+brdf-random on both sides; MIS alone: full rate with mis against full rate with brdf-random at equal rmse; together: the predicted
+rate with mis against full rate with brdf-random; overhead: bandwidth, pyramid, classify and upsample over full rate's frame";
 
 /// The whole report.
 pub fn text(report: &Report) -> String {
@@ -23,6 +33,16 @@ pub fn text(report: &Report) -> String {
     }
     if report.scenes.iter().any(|scene| scene.reference.is_some()) {
         parts.push(LEGEND.into());
+    }
+    if !report.table.is_empty() {
+        parts.push(format!("{COLUMNS}\n{}", gains::halves(report)));
+        parts.extend(gains::tables(&report.table));
+    }
+    if !report.targets.is_empty() {
+        parts.push(format!("Aims\n{}", gains::targets(&report.targets)));
+    }
+    if report.scenes.iter().any(|scene| scene.environment.is_some()) {
+        parts.push(format!("A new environment in every frame would cost\n{}", gains::environments(&report.scenes)));
     }
     if !report.summary.is_empty() {
         parts.push(format!("Speed-up at equal error against full rate, over scenes\n{}", summary(&report.summary)));
@@ -102,9 +122,9 @@ fn with_interval(e: &Equal) -> String {
 fn compared(scene: &SceneReport) -> String {
     let row = |row: &Row| {
         let error = row.error.as_ref();
-        let against = |own: bool, of: fn(&Equal) -> String, shown: bool| {
-            let of_mis = |a: &&Against| own != (a.estimator == "mis");
-            let equal = row.against.iter().find(of_mis).and_then(|a| if shown { a.psnr } else { a.rmse });
+        let against = |random: bool, of: fn(&Equal) -> String, shown: bool| {
+            let asked = |a: &&Against| random != (a.estimator == "mis");
+            let equal = row.against.iter().find(asked).and_then(|a| if shown { a.psnr } else { a.rmse });
             equal.map_or(String::new(), |e| of(&e))
         };
         vec![
@@ -122,7 +142,7 @@ fn compared(scene: &SceneReport) -> String {
         ]
     };
     let header =
-        ["variant", "shaded", "ms", "p10..p90", "of the first's", "rmse", "PSNR", "speed-up", "at PSNR", "error", "of its own"];
+        ["variant", "shaded", "ms", "p10..p90", "of the first's", "rmse", "PSNR", "speed-up", "at PSNR", "error", "over random"];
     let mut text = format!("{}\n{}", title(scene), aligned(&header, 1, scene.variants.iter().map(row)));
     if let Some(r) = &scene.reference {
         text += &format!(
@@ -131,6 +151,11 @@ fn compared(scene: &SceneReport) -> String {
         );
     }
     text
+}
+
+/// Estimators against each other are in the table of gains.
+fn same_estimator(gain: &&Gain) -> bool {
+    !gain.variant.starts_with("full") && gain.variant.contains("brdf-random") == (gain.estimator == "brdf-random")
 }
 
 fn summary(gains: &[Gain]) -> String {
@@ -150,5 +175,5 @@ fn summary(gains: &[Gain]) -> String {
         ]
     };
     let header = ["half", "variant", "against full", "equal", "scenes", "median", "least", "in", "most", "in"];
-    aligned(&header, 4, gains.iter().map(row))
+    aligned(&header, 4, gains.iter().filter(same_estimator).map(row))
 }

@@ -2,17 +2,15 @@
 
 use clap::ValueEnum;
 use indicatif::{ProgressBar, ProgressStyle};
-use passband::frequency::environment::EPS;
 use passband::offline::error::{Error, Result};
 use passband::offline::headless::Options;
 use passband::offline::image_io::{LinearImage, check_writable, write_atomically, write_image};
 use passband::offline::metrics::{Exposure, encode};
-use passband::offline::rates;
 use passband::offline::render::{Settings, render};
 use passband::offline::scene::{MAX_FRAMES, Scene};
 use passband::offline::sequence::render_frames;
 use passband::sampling::luminance;
-use passband::{Estimator, Filter};
+use passband::{Config, Estimator, Filter};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -35,9 +33,10 @@ pub struct Args {
     /// Where to shade
     #[arg(long, default_value = "full")]
     rate: Rate,
-    /// Directions a shaded pixel, their mean under a scene's settings.np_rule
-    #[arg(long, value_name = "N", default_value_t = 64)]
-    samples: u32,
+    /// Directions a shaded pixel (64), their mean under a scene's settings.np_rule, and the budget that the scene asks for if not
+    /// given; with --aa at --rate bandwidth a pixel has times its samples a side as many, shared by finer ones
+    #[arg(long, value_name = "N")]
+    samples: Option<u32>,
     /// How directions are drawn
     #[arg(long, default_value = "mis")]
     estimator: Method,
@@ -47,7 +46,7 @@ pub struct Args {
     /// How materials are read at a pixel's scale
     #[arg(long, default_value = "point")]
     filter: String,
-    /// Probes of the bandwidth prediction (4), 1 to 256 a block of 2x2 samples
+    /// Probes of the bandwidth prediction (4), 1 to 256 a block of 2x2 pixels
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=256))]
     probes: Option<u32>,
     /// Samples that a predicted cycle gets: a number, or auto (2 at 64 samples, rising with their root)
@@ -173,15 +172,16 @@ fn assignment(text: &str) -> std::result::Result<(String, String), String> {
 }
 
 impl Args {
-    fn settings(&self, scene_size: Option<[u32; 2]>, scene: Option<&Scene>) -> Result<Settings> {
+    /// In the place of what the scene says in `base`.
+    fn settings(&self, base: Config) -> Result<Settings> {
         let later = |yes: bool, what: &str| if yes { Err(Error::NotSupportedYet { what: what.into() }) } else { Ok(()) };
         let rate = match self.rate {
-            Rate::Full => passband::Rate::Full.into(),
-            Rate::Half => passband::Rate::Uniform(1).into(),
-            Rate::Quarter => passband::Rate::Uniform(2).into(),
-            Rate::Bandwidth => passband::Rate::Bandwidth.into(),
-            Rate::Luminance => passband::Rate::Luminance.into(),
-            Rate::Oracle => rates::Rate::Oracle,
+            Rate::Full => passband::Rate::Full,
+            Rate::Half => passband::Rate::Uniform(1),
+            Rate::Quarter => passband::Rate::Uniform(2),
+            Rate::Bandwidth => passband::Rate::Bandwidth,
+            Rate::Luminance => passband::Rate::Luminance,
+            Rate::Oracle => passband::Rate::Given,
         };
         let estimator = match self.estimator {
             Method::Mis => Estimator::Mis,
@@ -201,33 +201,34 @@ impl Args {
             _ => return Err(Error::NotSupportedYet { what: "--filter other than point and tk".into() }),
         };
         later(!self.literal.is_empty(), "--literal")?;
-        Ok(Settings {
-            extent: self.size.or(scene_size).unwrap_or([512, 512]),
+        let config = Config {
             rate,
-            lmax: scene.and_then(Scene::lmax),
-            probes: self.probes.unwrap_or(4),
+            probes: self.probes.unwrap_or(base.probes),
             samples_per_cycle: self.spc.0,
-            operator: scene.map(Scene::operator).unwrap_or_default(),
-            combine: scene.map(Scene::combine).unwrap_or_default(),
-            eps: scene.and_then(Scene::eps).unwrap_or(EPS),
             filter,
-            geometric: scene.is_some_and(Scene::geometric),
-            samples: scene.and_then(Scene::budget).unwrap_or(self.samples),
-            allocation: scene.map(Scene::allocation).unwrap_or_default(),
+            directions: self.samples.unwrap_or(base.directions),
             estimator,
             samples_per_side: self.aa,
+            ..base
+        };
+        Ok(Settings {
+            oracle: matches!(self.rate, Rate::Oracle),
             seed: self.seed,
             aovs: self.aov.iter().map(|name| name.parse()).collect::<Result<_>>()?,
             reference: self.reference,
             timed: self.stats.is_some(),
             device: Options { device: self.device.clone(), validate: self.validate },
+            ..Settings::new(config)
         })
     }
 }
 
+/// Image size where neither the command nor the scene says one.
+const SIZE: [u32; 2] = [512, 512];
+
 /// Runs the subcommand.
 pub fn run(args: &Args) -> Result<ExitCode> {
-    args.settings(None, None)?;
+    args.settings(Config::new(SIZE))?;
     let extension = args.output.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
     if !["exr", "png", "hdr"].contains(&extension.as_str()) {
         return Err(Error::argument("--output", "a name that ends in .exr, .png or .hdr", args.output.display()));
@@ -242,7 +243,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let scene = Scene::load(&args.scene, &args.set)?;
     let mut world = scene.animated()?;
     let loading = clock.elapsed().as_secs_f64() * 1e3;
-    let settings = args.settings(world.world().size, Some(&scene))?;
+    let settings = args.settings(scene.config(args.size.or(world.world().size).unwrap_or(SIZE)))?;
 
     let style = ProgressStyle::with_template("{msg} {bar:30} {pos}/{len} {eta}").unwrap_or_else(|_| ProgressStyle::default_bar());
     let bar = ProgressBar::new(1).with_style(style).with_message("frames");

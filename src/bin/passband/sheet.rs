@@ -1,5 +1,6 @@
 //! Sheets of plots, drawn into memory and written as PNG.
 
+use passband::offline::bench::tiles::Tile;
 use passband::offline::error::{Error, Result};
 use passband::offline::image_io::write_png;
 use plotters::coord::Shift;
@@ -39,6 +40,43 @@ pub fn write(path: &Path, size: (u32, u32), title: &str, draw: impl FnOnce(&Area
     sheet(&mut rgb).map_err(|e| failed(&e))?;
     let rgba: Vec<u8> = rgb.as_chunks().0.iter().flat_map(|&[r, g, b]| [r, g, b, 255]).collect();
     write_png(path, size.0, size.1, &rgba)
+}
+
+/// Most pixels a side of a contact sheet's tile: larger ones lose pixels.
+const MOST: u32 = 512;
+/// Of a line of a label, under its tile; labels have one or two.
+const LINE: u32 = 22;
+const GAP: u32 = 12;
+
+/// Writes images of one size under a title, each over its label, row by row.
+///
+/// # Errors
+/// As [`write`].
+pub fn contact(path: &Path, title: &str, columns: usize, tiles: &[Tile]) -> Result<()> {
+    let Some(first) = tiles.first() else { return Ok(()) };
+    let step = first.width.max(first.height).div_ceil(MOST);
+    // Small ones are enlarged, to have space for labels.
+    let times = if step > 1 { 1 } else { (MOST / first.width.max(1)).clamp(1, 8) };
+    let [width, height] = [first.width, first.height].map(|e| (e / step * times).max(1));
+    let (columns, rows) = (columns.max(1) as u32, tiles.len().div_ceil(columns.max(1)) as u32);
+    let size = (columns * (width + GAP) + GAP, 70 + rows * (height + 2 * LINE + GAP));
+    write(path, size, title, |root| {
+        let text = ("sans-serif", 18).into_font().color(&BLACK);
+        for (i, tile) in (0u32..).zip(tiles) {
+            let left = (GAP + i % columns * (width + GAP)) as i32;
+            let top = (i / columns * (height + 2 * LINE + GAP)) as i32;
+            let texel = |i: u32| (i / width / times * step) * tile.width + i % width / times * step;
+            let pixel = |i: u32| tile.rgb.get(texel(i) as usize).copied().unwrap_or_default();
+            let rgb: Vec<u8> = (0..width * height).flat_map(pixel).collect();
+            let picture = BitMapElement::<'_, _>::with_owned_buffer((left, top), (width, height), rgb);
+            root.draw(&picture.ok_or("a tile is not of its size")?)?;
+            for (line, label) in (0i32..).zip(tile.label.lines()) {
+                let below = top + height as i32 + 5 + line * LINE as i32;
+                root.draw(&Text::new(label.to_string(), (left, below), text.clone()))?;
+            }
+        }
+        Ok(())
+    })
 }
 
 /// The legend of all labelled series.

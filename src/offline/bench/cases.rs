@@ -2,7 +2,6 @@
 
 use crate::offline::error::Result;
 use crate::offline::scene::Scene;
-use crate::offline::world::World;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 
@@ -16,8 +15,20 @@ pub enum Half {
     Judged,
 }
 
+/// What a reflectance is like.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Gloss {
+    /// Images of the light are seen in it.
+    Mirror,
+    /// Highlights are.
+    Glossy,
+    /// Neither.
+    Rough,
+}
+
 /// A mesh in a reflectance under an environment.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub struct Case {
     /// A mesh, by the name that its scene has here.
     pub mesh: &'static str,
@@ -26,6 +37,7 @@ pub struct Case {
     /// A built-in environment, or the stem of a fetched one.
     pub environment: &'static str,
     /// Whether the quick preset has it.
+    #[serde(skip)]
     pub quick: bool,
 }
 
@@ -96,11 +108,25 @@ impl Case {
         format!("{} {} {}", self.mesh, self.reflectance, self.environment)
     }
 
+    /// What its reflectance is like.
+    pub fn gloss(&self) -> Gloss {
+        match self.reflectance {
+            "mirror-metal" => Gloss::Mirror,
+            "rough" | "satin" => Gloss::Rough,
+            _ => Gloss::Glossy,
+        }
+    }
+
+    /// Whether the mesh has no bumps of the size of a few pixels.
+    pub fn is_smooth(&self) -> bool {
+        matches!(self.mesh, "sphere" | "torus-knot" | "bunny")
+    }
+
     /// The scene under `root` (the repository), or the names of what `scripts/fetch-assets` has to fetch for it.
     ///
     /// # Errors
-    /// Of the scene file or of what it names.
-    pub fn world(&self, root: &Path) -> Result<std::result::Result<World, Vec<&'static str>>> {
+    /// Of the scene file.
+    pub fn scene(&self, root: &Path) -> Result<std::result::Result<Scene, Vec<&'static str>>> {
         let Some((_, scene, material, file)) = MESHES.iter().find(|m| m.0 == self.mesh) else { return Ok(Err(vec![self.mesh])) };
         let assets = root.join(ASSETS);
         let builtin = BUILTIN_ENVIRONMENTS.contains(&self.environment);
@@ -120,9 +146,7 @@ impl Case {
         };
         let reflectance = (format!("materials.{material}.reflectance.builtin"), self.reflectance.to_string());
         let scene = if file.is_some() { root.join(scene).to_string_lossy().into_owned() } else { scene.to_string() };
-        let mut world = Scene::load(&scene, &[environment, reflectance])?.resolve()?;
-        world.name = self.name();
-        Ok(Ok(world))
+        Ok(Ok(Scene::load(&scene, &[environment, reflectance])?))
     }
 }
 
@@ -144,10 +168,10 @@ mod tests {
         }
         let nowhere = Path::new("/nowhere");
         for (_, case) in all(true) {
-            let world = case.world(nowhere).unwrap().unwrap();
-            assert_eq!((world.name, world.objects.len()), (case.name(), 1));
+            let world = case.scene(nowhere).unwrap().unwrap().resolve().unwrap();
+            assert_eq!((world.name.as_str(), world.objects.len()), (case.mesh, 1));
         }
         let armadillo = Case { environment: "city", ..case("armadillo", "rough", "") };
-        assert_eq!(armadillo.world(nowhere).unwrap().unwrap_err(), ["armadillo", "environments"]);
+        assert_eq!(armadillo.scene(nowhere).unwrap().unwrap_err(), ["armadillo", "environments"]);
     }
 }

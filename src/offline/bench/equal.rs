@@ -43,6 +43,8 @@ pub struct Equal {
     pub error_ratio: f64,
     /// What `error_ratio` is.
     pub error_ratio_is: Is,
+    /// Directions that full rate takes in the variant's frame time; of the nearest rung beyond the ladder's ends.
+    pub directions_in_time: f64,
 }
 
 /// Compares a variant of `error` with full rate on `ladder`, at median times, interpolated between its rungs in logarithms.
@@ -56,6 +58,8 @@ pub fn equal(ladder: &[Rung], error: f64, times: &[f64]) -> Option<Equal> {
     let (speed_up, side) = at(&|times| median(times.to_vec()))?;
     let (directions, _) = log_log(ladder.iter().map(|r| (r.error, r.directions.into())).collect(), error)?;
     let of_time = ladder.iter().map(|r| (median(r.times.clone()), r.error)).collect();
+    let of_rate = ladder.iter().map(|r| (median(r.times.clone()), r.directions.into())).collect();
+    let (directions_in_time, _) = log_log(of_rate, median(times.to_vec()))?;
     let (reached, end) = log_log(of_time, median(times.to_vec()))?;
     let resampled = |rounds: &[usize]| at(&|times| median(pick(times, rounds))).map_or(speed_up, |found| found.0);
     Some(Equal {
@@ -67,6 +71,7 @@ pub fn equal(ladder: &[Rung], error: f64, times: &[f64]) -> Option<Equal> {
         error_ratio: error / reached,
         // A longer time than the longest: full rate would be better than that.
         error_ratio_is: [Is::AtMost, Is::Found, Is::AtLeast][end],
+        directions_in_time,
     })
 }
 
@@ -109,6 +114,7 @@ mod tests {
         let e = equal(&ladder(), 0.1, &[25.0; 3]).unwrap();
         assert!((e.directions - 100.0).abs() < 1e-9 && (e.speed_up - 4.0).abs() < 1e-9 && (e.error_ratio - 0.5).abs() < 1e-9);
         assert_eq!((e.speed_up_is, e.error_ratio_is), (Is::Found, Is::Found));
+        assert!((e.directions_in_time - 25.0).abs() < 1e-9, "{e:?}");
         for rung in ladder() {
             let e = equal(&ladder(), rung.error, &rung.times).unwrap();
             assert!((e.speed_up - 1.0).abs() < 1e-9 && (e.error_ratio - 1.0).abs() < 1e-9, "{e:?}");

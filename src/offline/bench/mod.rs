@@ -4,10 +4,18 @@
 //! are stated at equal error and at equal time, against full rate with the same and with the default estimator.
 
 pub mod cases;
+pub mod curves;
+pub mod environment;
 pub mod equal;
+pub mod figures;
+pub mod judge;
 pub mod quality;
 pub mod reference;
 pub mod report;
 pub mod runner;
+pub mod spectrum;
 pub mod statistics;
 pub mod suites;
+pub mod table;
+pub mod tiles;
+pub mod variants;

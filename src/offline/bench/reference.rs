@@ -4,15 +4,15 @@
 //! An entry's content is: width, height and directions a frame; for each half its number of frames and its mean `R G B A`; all
 //! little-endian and of 32 bits. An entry is written every half minute and can be continued.
 
-use crate::Requirements;
 use crate::offline::bench::quality::{self, Frame, Noise};
 use crate::offline::cache;
 use crate::offline::error::Result;
-use crate::offline::headless::{Headless, Options};
+use crate::offline::headless::Headless;
 use crate::offline::metrics::Picture;
 use crate::offline::render::Settings;
 use crate::offline::session::Session;
 use crate::offline::world::World;
+use crate::{Config, Requirements};
 use sha2::{Digest, Sha256};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -156,22 +156,21 @@ impl Converged {
     }
 }
 
-/// The converged image of `world` at `extent` pixels, one sample a pixel: from `cache` as far as it is there, and rendered at
-/// full rate with the default estimator until `goal` is met. `progress` is told how many of at most how many directions a
+/// The converged image of `world` as `base` filters it, one sample a pixel: from the cache as far as it is there, and rendered
+/// at full rate with the default estimator until `goal` is met. `progress` is told how many of at most how many directions a
 /// pixel are there.
 ///
 /// # Errors
 /// The library's or the device's. A cache that cannot be written only costs the time again.
 pub fn converge(
     world: &World,
-    device: &Options,
-    extent: [u32; 2],
+    base: &Settings,
     goal: &Goal,
     folder: Option<&Path>,
     progress: &mut dyn FnMut(u64, u64),
 ) -> Result<Converged> {
-    let mut image = Converged::new(extent);
-    let entry = folder.map(|folder| folder.join(format!("{}.reference", key(world, &image))));
+    let mut image = Converged::new(base.config.extent);
+    let entry = folder.map(|folder| folder.join(format!("{}.reference", key(world, &base.config, &image))));
     if let Some(known) = entry.as_ref().and_then(|entry| Converged::from_bytes(&cache::read(entry)?, &image)) {
         image = known;
     }
@@ -180,7 +179,7 @@ pub fn converge(
     while !image.is_enough(goal)? {
         let session = match &mut session {
             Some(session) => session,
-            none => none.insert(open(world, device, &image)?),
+            none => none.insert(open(world, base, &image)?),
         };
         session.frame([SEED, image.frames()])?;
         let (bytes, ..) = session.image("resolved")?;
@@ -199,18 +198,23 @@ pub fn converge(
 }
 
 /// Drops what is known of `world`.
-pub fn forget(world: &World, extent: [u32; 2], folder: &Path) {
-    let name = format!("{}.reference", key(world, &Converged::new(extent)));
+pub fn forget(world: &World, base: &Settings, folder: &Path) {
+    let name = format!("{}.reference", key(world, &base.config, &Converged::new(base.config.extent)));
     if let Err(e) = std::fs::remove_file(folder.join(name)) {
         log::warn!("a reference is not dropped: {e}");
     }
 }
 
-fn open(world: &World, device: &Options, image: &Converged) -> Result<Session> {
-    let settings = Settings { samples: image.directions, device: device.clone(), ..Settings::new(image.extent) };
-    let config = settings.config();
+fn open(world: &World, base: &Settings, image: &Converged) -> Result<Session> {
+    let config = Config {
+        frames_in_flight: 1,
+        filter: base.config.filter,
+        geometric: base.config.geometric,
+        directions: image.directions,
+        ..Config::new(image.extent)
+    };
     config.validate()?;
-    Session::new(Headless::new(device, &Requirements::of(&config))?, world, &config)
+    Session::new(Headless::new(&base.device, &Requirements::of(&config))?, world, &config)
 }
 
 /// Hashes text as it is written.
@@ -224,10 +228,11 @@ impl std::fmt::Write for Hashed {
 }
 
 /// The name of a world's content. Its debugging text has every number to the last bit, and whatever a world comes to hold.
-fn key(world: &World, image: &Converged) -> String {
+fn key(world: &World, config: &Config, image: &Converged) -> String {
     let mut hash = Hashed(Sha256::new());
+    let filter = if config.widened() { " widened" } else { "" };
     // A hash takes any text.
-    let _ = write!(hash, "{VERSION} {:?} {} {world:?}", image.extent, image.directions);
+    let _ = write!(hash, "{VERSION} {:?} {}{filter} {world:?}", image.extent, image.directions);
     format!("{:x}", hash.0.finalize())
 }
 
@@ -283,7 +288,8 @@ mod tests {
             let overrides: Vec<_> = overrides.iter().map(|(k, v)| (k.to_string(), v.to_string())).collect();
             Scene::load("sphere", &overrides).and_then(|s| s.resolve()).unwrap()
         };
-        let name = |world: &World| key(world, &Converged::new([64, 64]));
+        let config = Config::new([64, 64]);
+        let name = |world: &World| key(world, &config, &Converged::new([64, 64]));
         let plain = name(&world(&[]));
         assert_eq!(plain, name(&world(&[])));
         let others = [
@@ -296,6 +302,7 @@ mod tests {
         for other in others {
             assert_ne!(plain, name(&world(&[other])), "{other:?}");
         }
-        assert_ne!(plain, key(&world(&[]), &Converged::new([64, 65])));
+        assert_ne!(plain, key(&world(&[]), &config, &Converged::new([64, 65])));
+        assert_ne!(plain, key(&world(&[]), &Config { geometric: true, ..config.clone() }, &Converged::new([64, 64])));
     }
 }

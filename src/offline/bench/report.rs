@@ -1,11 +1,14 @@
 //! What a bench found: the `--json` file, schema 1.
 
 use crate::gpu::timer::FrameTimings;
-use crate::offline::bench::cases::Half;
+use crate::offline::bench::cases::{Case, Half};
+use crate::offline::bench::curves::Curve;
+use crate::offline::bench::environment::EnvironmentTimes;
 use crate::offline::bench::equal::{Equal, Is};
 use crate::offline::bench::quality::Noise;
-use crate::offline::bench::runner::Measured;
+use crate::offline::bench::runner::{Measured, Part};
 use crate::offline::bench::statistics::{Ratio, Summary, ratio_of_medians};
+use crate::offline::bench::table::{Line, Target};
 use crate::offline::headless::DeviceInfo;
 use crate::offline::metrics::Metrics;
 use crate::offline::stats::{Pixels, Samples};
@@ -33,6 +36,10 @@ pub struct Report {
     pub skipped: Vec<Skipped>,
     /// Gains over all scenes of a half.
     pub summary: Vec<Gain>,
+    /// The suite bagher: full rate beside the predicted one, for each number of directions that both have.
+    pub table: Vec<Line>,
+    /// What was aimed at.
+    pub targets: Vec<Target>,
     /// Wall times of the run.
     pub seconds: Seconds,
 }
@@ -62,8 +69,14 @@ pub struct SceneReport {
     pub name: String,
     /// Whether defaults were chosen or are judged on it; absent for scenes of the user's.
     pub half: Option<Half>,
+    /// What it consists of; absent for scenes of the user's.
+    pub case: Option<Case>,
     /// Output pixels.
     pub extent: [u32; 2],
+    /// What a new environment costs; absent in suites without errors and in scenes without one.
+    pub environment: Option<EnvironmentTimes>,
+    /// Error of reconstruction alone over shaded samples; empty unless it is asked for, in suites with errors.
+    pub curves: Vec<Curve>,
     /// What errors are against; absent in suites without errors.
     pub reference: Option<ReferenceReport>,
     /// Variants; the last is the control.
@@ -91,6 +104,8 @@ pub struct ReferenceReport {
 pub struct Row {
     /// Its name.
     pub name: String,
+    /// What it is for.
+    pub part: Part,
     /// As `passband render --stats` has them.
     pub settings: BTreeMap<&'static str, serde_json::Value>,
     /// Counts of finest samples.
@@ -105,6 +120,8 @@ pub struct Row {
     pub rounds_ms: Vec<f64>,
     /// GPU milliseconds of all passes added.
     pub passes_ms: Summary,
+    /// CPU milliseconds that recording a frame takes.
+    pub record_ms: Summary,
     /// Frame time over the first variant's.
     pub over_first: Option<Ratio>,
     /// Passes in recording order.
@@ -113,7 +130,7 @@ pub struct Row {
     pub memory_bytes: u64,
     /// Error against the reference, over some frames; infinite values are null.
     pub error: Option<Metrics>,
-    /// Comparison with full rate of the estimator mis and, if it has another, of its own; not with itself.
+    /// Comparison with full rate of each estimator that is measured there; not with itself.
     pub against: Vec<Against>,
 }
 
@@ -175,10 +192,17 @@ pub struct SpeedUp {
     pub is: Is,
 }
 
+impl SceneReport {
+    /// The variant of that name.
+    pub fn row(&self, name: &str) -> Option<&Row> {
+        self.variants.iter().find(|row| row.name == name)
+    }
+}
+
 impl Row {
     /// Of a variant; `first` are the times of the first one.
-    pub fn new(name: String, measured: Measured, first: &[FrameTimings]) -> Self {
-        let Measured { stats, times } = measured;
+    pub fn new(measured: Measured, first: &[FrameTimings]) -> Self {
+        let Measured { variant, stats, times, record_ms } = measured;
         let spans = |times: &[FrameTimings]| times.iter().map(|t| t.span_ms).collect::<Vec<_>>();
         let rounds_ms = spans(&times);
         let sums: Vec<f64> = times.iter().map(|t| t.passes.iter().map(|p| p.1).sum()).collect();
@@ -189,7 +213,9 @@ impl Row {
             PassRow { name, ms, bytes, gb_per_s }
         };
         Self {
-            name,
+            name: variant.name,
+            part: variant.part,
+            record_ms: Summary::of(&record_ms),
             shaded_fraction: stats.pixels.shaded as f64 / stats.pixels.covered.max(1) as f64,
             frame_ms: Summary::of(&rounds_ms),
             over_first: ratio_of_medians(&rounds_ms, &spans(first)),
@@ -205,20 +231,31 @@ impl Row {
         }
     }
 
+    /// Against full rate of that estimator at equal root mean squared error.
+    pub fn against(&self, estimator: &str) -> Option<Equal> {
+        self.against.iter().find(|a| a.estimator == estimator)?.rmse
+    }
+
     /// Directions a covered sample.
     pub fn directions(&self) -> f64 {
         self.samples.taken as f64 / self.pixels.covered.max(1) as f64
     }
 }
 
-/// Gains of every variant over the scenes of each half, in the order in which they first appear.
+/// Gains of every variant over the scenes of each half, in the order in which they first appear; of other settings than the
+/// default those by which it is chosen: with the same estimator on both sides, at equal root mean squared error.
 pub fn gains(scenes: &[SceneReport]) -> Vec<Gain> {
     type Key<'a> = (Option<Half>, &'a str, &'static str, &'static str);
     let mut found: Vec<(Key<'_>, Vec<(&str, SpeedUp)>)> = Vec::new();
     for scene in scenes {
         for (row, against) in scene.variants.iter().flat_map(|row| row.against.iter().map(move |a| (row, a))) {
             for (measure, equal) in [("rmse", against.rmse), ("psnr", against.psnr)] {
-                let Some(equal) = equal else { continue };
+                let counts = match row.part {
+                    Part::Compared => true,
+                    Part::Setting => against.estimator == "mis" && measure == "rmse",
+                    Part::FallBack | Part::Control => false,
+                };
+                let Some(equal) = equal.filter(|_| counts) else { continue };
                 let entry = (scene.name.as_str(), SpeedUp { factor: equal.speed_up, is: equal.speed_up_is });
                 let key = (scene.half, row.name.as_str(), against.estimator, measure);
                 match found.iter_mut().find(|(known, _)| *known == key) {
@@ -249,7 +286,7 @@ pub fn gains(scenes: &[SceneReport]) -> Vec<Gain> {
 }
 
 /// The median of sorted gains: of an even number the mean of the middle two, a bound if one of them is.
-fn middle(sorted: &[(&str, SpeedUp)]) -> Option<SpeedUp> {
+pub(super) fn middle(sorted: &[(&str, SpeedUp)]) -> Option<SpeedUp> {
     let (low, high) = (sorted.get((sorted.len().checked_sub(1)?) / 2)?.1, sorted.get(sorted.len() / 2)?.1);
     let is = if low.is == Is::Found { high.is } else { low.is };
     Some(SpeedUp { factor: (low.factor + high.factor) / 2.0, is })

@@ -9,6 +9,7 @@ use crate::offline::session::Session;
 use crate::offline::stats::Stats;
 use crate::offline::world::World;
 use crate::{Config, Requirements};
+use serde::Serialize;
 
 /// Frames of each variant before timing starts.
 pub const WARM_UP: u32 = render::WARM_UP;
@@ -23,16 +24,6 @@ pub trait Timed {
 
     /// Times of the frame before the last.
     fn timings(&self) -> Option<&FrameTimings>;
-}
-
-impl Timed for Session {
-    fn frame(&mut self, seed: [u32; 2]) -> Result<()> {
-        Session::frame(self, seed)
-    }
-
-    fn timings(&self) -> Option<&FrameTimings> {
-        Session::timings(self)
-    }
 }
 
 /// Times of `rounds` frames of each subject, after [`WARM_UP`] frames each. Every other round runs backwards: A B B A. One
@@ -66,30 +57,90 @@ pub fn interleave<T: Timed>(
     Ok(times)
 }
 
-/// What is measured: a world with settings.
-pub struct Variant<'a> {
+/// What a variant is measured for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Part {
+    /// To be compared with the others.
+    Compared,
+    /// Another setting than the default: the best of these is what a scene could gain.
+    Setting,
+    /// What a prediction costs that gives up.
+    FallBack,
+    /// The first variant once more.
+    Control,
+}
+
+/// What is measured.
+#[derive(Clone)]
+pub struct Variant {
     /// Its row's name.
     pub name: String,
-    /// What is rendered; `reference` and `timed` are not looked at.
+    /// What it is for.
+    pub part: Part,
+    /// What is rendered; `aovs`, `reference` and `timed` are not looked at.
     pub settings: Settings,
-    /// The scene.
-    pub world: &'a World,
+}
+
+/// A session and what its frames took.
+struct Subject {
+    session: Session,
+    config: Config,
+    /// Of every frame.
+    record_ms: Vec<f64>,
+}
+
+impl Subject {
+    fn new(variant: &Variant, world: &World) -> Result<Self> {
+        let config = variant.settings.config();
+        config.validate()?;
+        let mut session = Session::new(Headless::new(&variant.settings.device, &Requirements::of(&config))?, world, &config)?;
+        variant.settings.prepare(&mut session, world, &config)?;
+        Ok(Self { session, config, record_ms: Vec::new() })
+    }
+}
+
+impl Timed for Session {
+    fn frame(&mut self, seed: [u32; 2]) -> Result<()> {
+        self.frame(seed)
+    }
+
+    fn timings(&self) -> Option<&FrameTimings> {
+        self.timings()
+    }
+}
+
+impl Timed for Subject {
+    fn frame(&mut self, seed: [u32; 2]) -> Result<()> {
+        self.session.frame(seed)?;
+        self.record_ms.push(self.session.record_ms());
+        Ok(())
+    }
+
+    fn timings(&self) -> Option<&FrameTimings> {
+        self.session.timings()
+    }
 }
 
 /// Variants on the device, each with a session of its own. The last is the first once more, untouched: the control, whose
 /// difference from the first is the measurement's own noise.
 pub struct Runner<'a> {
-    variants: Vec<(Variant<'a>, Config)>,
-    sessions: Vec<Session>,
+    world: &'a World,
+    variants: Vec<Variant>,
+    subjects: Vec<Subject>,
     times: Vec<Vec<FrameTimings>>,
 }
 
 /// What one variant took.
 pub struct Measured {
+    /// It.
+    pub variant: Variant,
     /// As `passband render --stats` has it.
     pub stats: Stats,
     /// Times of each frame.
     pub times: Vec<FrameTimings>,
+    /// CPU milliseconds that recording each frame took.
+    pub record_ms: Vec<f64>,
 }
 
 impl<'a> Runner<'a> {
@@ -97,20 +148,17 @@ impl<'a> Runner<'a> {
     ///
     /// # Errors
     /// Of the settings, the device or the driver.
-    pub fn new(mut variants: Vec<Variant<'a>>, progress: &mut dyn FnMut(u64, u64)) -> Result<Self> {
+    pub fn new(world: &'a World, mut variants: Vec<Variant>, progress: &mut dyn FnMut(u64, u64)) -> Result<Self> {
         if let Some(first) = variants.first() {
             let name = format!("control: {}", first.name);
-            variants.push(Variant { name, settings: first.settings.clone(), world: first.world });
+            variants.push(Variant { name, part: Part::Control, settings: first.settings.clone() });
         }
         let total = variants.len() as u64;
-        let mut runner = Self { variants: Vec::new(), sessions: Vec::new(), times: Vec::new() };
+        let mut runner = Self { world, variants: Vec::new(), subjects: Vec::new(), times: Vec::new() };
         for variant in variants {
-            let config = variant.settings.config();
-            config.validate()?;
-            let headless = Headless::new(&variant.settings.device, &Requirements::of(&config))?;
-            runner.sessions.push(Session::new(headless, variant.world, &config)?);
-            runner.variants.push((variant, config));
-            progress(runner.sessions.len() as u64, total);
+            runner.subjects.push(Subject::new(&variant, world)?);
+            runner.variants.push(variant);
+            progress(runner.subjects.len() as u64, total);
         }
         Ok(runner)
     }
@@ -120,19 +168,20 @@ impl<'a> Runner<'a> {
     /// # Errors
     /// The device's.
     pub fn time(&mut self, rounds: u32, progress: &mut dyn FnMut(u64, u64)) -> Result<()> {
-        self.times = interleave(&mut self.sessions, rounds, progress)?;
+        self.times = interleave(&mut self.subjects, rounds, progress)?;
         Ok(())
     }
 
-    /// Name, statistics and times of every variant; the control is last.
+    /// Statistics and times of every variant; the control is last.
     ///
     /// # Errors
     /// The device's, on read-back.
-    pub fn measured(&mut self) -> Result<Vec<(String, Measured)>> {
-        let rows = self.variants.iter().zip(&mut self.sessions).zip(&self.times);
-        rows.map(|(((variant, config), session), times)| {
-            let stats = render::statistics(variant.world, &variant.settings, config, session, times)?;
-            Ok((variant.name.clone(), Measured { stats, times: times.clone() }))
+    pub fn measured(&mut self) -> Result<Vec<Measured>> {
+        let rows = self.variants.iter().zip(&mut self.subjects).zip(&self.times);
+        rows.map(|((variant, subject), times)| {
+            let stats = render::statistics(self.world, &variant.settings, &subject.config, &mut subject.session, times)?;
+            let record_ms = subject.record_ms.iter().skip(WARM_UP as usize).take(times.len()).copied().collect();
+            Ok(Measured { variant: variant.clone(), stats, times: times.clone(), record_ms })
         })
         .collect()
     }
@@ -142,19 +191,19 @@ impl<'a> Runner<'a> {
     /// # Errors
     /// The device's, on read-back.
     pub fn frames(&mut self, count: u32, progress: &mut dyn FnMut(u64, u64)) -> Result<Vec<Vec<Frame>>> {
-        let variants = self.sessions.len().saturating_sub(1);
+        let variants = self.subjects.len().saturating_sub(1);
         let total = variants as u64 * u64::from(count);
         let mut done = 0;
-        let mut frames = |session: &mut Session| {
+        let mut frames = |subject: &mut Subject| {
             let all = (0..count).map(|frame| {
-                session.frame([1, frame])?;
+                subject.frame([1, frame])?;
                 done += 1;
                 progress(done, total);
-                Frame::read(session)
+                Frame::read(&mut subject.session)
             });
             all.collect()
         };
-        self.sessions.iter_mut().take(variants).map(&mut frames).collect()
+        self.subjects.iter_mut().take(variants).map(&mut frames).collect()
     }
 }
 

@@ -39,8 +39,8 @@ impl Outcome {
 /// A converged view.
 pub struct Oracle {
     surface: Surface,
-    /// Of each sample; of no meaning where nothing is seen.
-    radiance: Vec<DVec3>,
+    /// `R G B` of each sample, of no meaning where nothing is seen, and whether something is.
+    frame: Vec<[f32; 4]>,
     shown: Vec<DVec3>,
     exposure: f64,
     covered: usize,
@@ -50,16 +50,30 @@ pub struct Oracle {
 }
 
 impl Oracle {
-    /// Of `surface` with the converged linear `radiance` of its samples, for levels up to `top`.
-    pub fn new(surface: Surface, radiance: Vec<DVec3>, top: u32) -> Self {
+    /// Of `surface` with the converged linear `R G B` of its samples (the fourth value is not looked at), for levels up to `top`.
+    pub fn new(surface: Surface, radiance: Vec<[f32; 4]>, top: u32) -> Self {
         let covered = surface.samples.iter().flatten().count();
-        let seen = surface.samples.iter().zip(&radiance).filter(|(sample, _)| sample.is_some());
-        let mean = seen.map(|(_, c)| luminance(*c)).sum::<f64>() / covered.max(1) as f64;
+        let seen = |([r, g, b, _], sample): ([f32; 4], &Option<_>)| match sample {
+            Some(_) => [r, g, b, 1.0],
+            None => [0.0; 4],
+        };
+        let frame: Vec<[f32; 4]> = radiance.into_iter().zip(&surface.samples).map(seen).collect();
+        let mean = frame.iter().map(|texel| luminance(colour(texel))).sum::<f64>() / covered.max(1) as f64;
         let exposure = Exposure::Auto.factor(mean);
-        let shown = radiance.iter().map(|c| show(*c, exposure)).collect();
-        let mut oracle = Self { surface, radiance, shown, exposure, covered, top, cells: Vec::new() };
+        let shown = frame.iter().map(|texel| show(colour(texel), exposure)).collect();
+        let mut oracle = Self { surface, frame, shown, exposure, covered, top, cells: Vec::new() };
         oracle.cells = (0..=top).map(|level| oracle.uniform(level)).collect();
         oracle
+    }
+
+    /// Linear radiance and coverage of each sample, row by row.
+    pub fn frame(&self) -> &[[f32; 4]] {
+        &self.frame
+    }
+
+    /// Samples that see something.
+    pub fn covered(&self) -> usize {
+        self.covered
     }
 
     /// What `levels` of the samples, row by row, come to.
@@ -103,7 +117,7 @@ impl Oracle {
     /// The levels of the samples, row by row, and what they come to, with the fewest shaded samples that were found for an error
     /// of at most `most`; all samples are shaded where coarser ones do not reach it.
     pub fn cheapest(&self, most: f64) -> (Vec<u8>, Outcome) {
-        let finest = vec![0; self.radiance.len()];
+        let finest = vec![0; self.frame.len()];
         let mut best = (self.outcome(&finest), finest);
         // Logarithms of prices: from error that is free to error of half a step of 8 bits that is worth more than its sample.
         let [mut low, mut high] = [-10.0, 20.0];
@@ -132,7 +146,7 @@ impl Oracle {
     /// The squared errors of all samples, row by row, over their channels.
     fn errors(&self, pyramid: &Pyramid, sources: &[Vec<Source>]) -> impl Iterator<Item = f64> {
         let width = self.surface.extent[0];
-        let mut values = reconstruction::upsample(pyramid, sources, |[x, y], _| self.radiance[y * width + x]);
+        let mut values = reconstruction::upsample(pyramid, sources, |[x, y], _| colour(&self.frame[y * width + x]));
         let finest = values.swap_remove(0).into_iter().zip(&self.shown);
         finest.map(|(value, expected)| value.map_or(0.0, |c| (show(c, self.exposure) - *expected).length_squared()))
     }
@@ -161,6 +175,10 @@ impl Oracle {
     }
 }
 
+fn colour(&[r, g, b, _]: &[f32; 4]) -> DVec3 {
+    DVec3::new(r.into(), g.into(), b.into())
+}
+
 fn show(linear: DVec3, exposure: f64) -> DVec3 {
     (linear * exposure).map(encode)
 }
@@ -171,30 +189,38 @@ fn show(linear: DVec3, exposure: f64) -> DVec3 {
 /// # Errors
 /// The device's.
 pub fn levels(world: &World, config: &Config, device: &Options, seed: u32) -> Result<Vec<u8>> {
-    let (oracle, bandwidth) = of(world, config, device, seed)?;
+    let oracle = converged(world, config, device, seed)?;
+    let bandwidth = predicted(world, config, device, seed)?;
     Ok(oracle.cheapest(oracle.outcome(&bandwidth).error).0)
 }
 
-/// The converged view of `world`, and the levels of [`Rate::Bandwidth`] in it.
+/// The converged view of `world`.
 ///
 /// # Errors
 /// The device's.
-pub fn of(world: &World, config: &Config, device: &Options, seed: u32) -> Result<(Oracle, Vec<u8>)> {
+pub fn converged(world: &World, config: &Config, device: &Options, seed: u32) -> Result<Oracle> {
     let full = Config { rate: Rate::Full, estimator: Estimator::Mis, directions: REFERENCE, ..config.clone() };
     let mut session = Session::new(Headless::new(device, &Requirements::of(&full))?, world, &full)?;
     session.frame([seed, 0])?;
     let (bytes, ..) = session.image("radiance")?;
     let texels: Vec<[f32; 4]> = bytemuck::pod_collect_to_vec(&bytes);
-    let radiance = texels.iter().map(|&[r, g, b, _]| DVec3::new(r.into(), g.into(), b.into())).collect();
-    let surface = surface(&mut session, world)?;
-    drop(session);
+    let top = Config { rate: Rate::Bandwidth, ..config.clone() }.coarsest();
+    Ok(Oracle::new(surface(&mut session, world)?, texels, top))
+}
 
+/// The levels of [`Rate::Bandwidth`] in `world`.
+///
+/// # Errors
+/// The device's.
+pub fn predicted(world: &World, config: &Config, device: &Options, seed: u32) -> Result<Vec<u8>> {
     let predicted = Config { rate: Rate::Bandwidth, ..config.clone() };
     let mut session = Session::new(Headless::new(device, &Requirements::of(&predicted))?, world, &predicted)?;
     session.frame([seed, 0])?;
     let (bytes, ..) = session.image("level")?;
-    let levels = bytemuck::pod_collect_to_vec::<u8, u32>(&bytes).into_iter().map(|level| level.min(255) as u8).collect();
-    Ok((Oracle::new(surface, radiance, predicted.coarsest()), levels))
+    let levels = bytemuck::pod_collect_to_vec::<u8, u32>(&bytes);
+    // Where the prediction gave up, it has left most levels as they were.
+    let fell_back = session.words("block arguments")?.get(3) == Some(&0);
+    Ok(levels.into_iter().map(|level| if fell_back { 0 } else { level.min(255) as u8 }).collect())
 }
 
 /// The surfaces that the last frame of `session` saw of `world`.

@@ -1,5 +1,6 @@
 //! Scene files: TOML in, a resolved [`World`] out.
 
+use crate::Config;
 use crate::frequency::allocation::Allocation;
 use crate::frequency::operators::{Combine, Operator};
 use crate::offline::animation::AnimatedWorld;
@@ -102,48 +103,31 @@ impl Scene {
         animation::animated(self, world, &sources)
     }
 
-    /// The coarsest level of shading that the scene asks for, if it does: 0 is an output pixel, +1 is 2x2 coarser.
-    pub fn lmax(&self) -> Option<u32> {
-        self.file.settings.lmax.as_ref().map(|v| *v.get_ref())
-    }
-
-    /// What the prediction of bandwidth takes for reflection.
-    pub fn operator(&self) -> Operator {
-        match self.file.settings.operator.as_ref().map(|v| v.get_ref().as_str()) {
-            Some("box") => Operator::Box,
-            Some("covariance") => Operator::Covariance,
-            _ => Operator::default(),
+    /// Defaults for an image of `extent` pixels, with the scene's own `[settings]` in their place.
+    pub fn config(&self, extent: [u32; 2]) -> Config {
+        let settings = &self.file.settings;
+        let base = Config::new(extent);
+        Config {
+            lmax: settings.lmax.as_ref().map_or(base.lmax, |v| *v.get_ref()),
+            operator: match settings.operator.as_ref().map(|v| v.get_ref().as_str()) {
+                Some("box") => Operator::Box,
+                Some("covariance") => Operator::Covariance,
+                _ => base.operator,
+            },
+            combine: match settings.combine.as_ref().map(|v| v.get_ref().as_str()) {
+                Some("max") => Combine::Max,
+                _ => base.combine,
+            },
+            eps: settings.eps.as_ref().map_or(base.eps, |v| *v.get_ref()),
+            geometric: settings.geometric.as_ref().map_or(base.geometric, |v| *v.get_ref()),
+            directions: settings.budget.as_ref().map_or(base.directions, |v| *v.get_ref()),
+            allocation: {
+                let rules = [Allocation::Equation8, Allocation::Deviation, Allocation::RelativeDeviation];
+                let name = settings.np_rule.as_ref().map(|v| v.get_ref().as_str());
+                rules.into_iter().find(|rule| Some(rule.name()) == name).unwrap_or(base.allocation)
+            },
+            ..base
         }
-    }
-
-    /// How it combines its probes.
-    pub fn combine(&self) -> Combine {
-        match self.file.settings.combine.as_ref().map(|v| v.get_ref().as_str()) {
-            Some("max") => Combine::Max,
-            _ => Combine::default(),
-        }
-    }
-
-    /// The share of the largest detail below which details do not count in analyses, if the scene says.
-    pub fn eps(&self) -> Option<f64> {
-        self.file.settings.eps.as_ref().map(|v| *v.get_ref())
-    }
-
-    /// How shaded samples share directions.
-    pub fn allocation(&self) -> Allocation {
-        let rules = [Allocation::Equation8, Allocation::Deviation, Allocation::RelativeDeviation];
-        let name = self.file.settings.np_rule.as_ref().map(|v| v.get_ref().as_str());
-        rules.into_iter().find(|rule| Some(rule.name()) == name).unwrap_or_default()
-    }
-
-    /// Mean directions of a shaded sample, if the scene asks for a number.
-    pub fn budget(&self) -> Option<u32> {
-        self.file.settings.budget.as_ref().map(|v| *v.get_ref())
-    }
-
-    /// Whether the mesh's curvature widens lobes, whatever the filter.
-    pub fn geometric(&self) -> bool {
-        self.file.settings.geometric.as_ref().is_some_and(|v| *v.get_ref())
     }
 
     /// Names of the built-in scenes, each with a line that describes it.

@@ -1,0 +1,123 @@
+//! The tables of a bench's gains: full against predicted rate, aims, and what environments cost.
+
+use super::{aligned, bounded};
+use passband::offline::bench::cases::Half;
+use passband::offline::bench::report::{Report, SceneReport};
+use passband::offline::bench::statistics::Ratio;
+use passband::offline::bench::table::{Gained, Line, Target, Verdict};
+
+/// Passes that have a column; the others are together in the last one.
+const PASSES: [&str; 6] = ["gbuffer", "bandwidth", "pyramid", "classify", "shade", "upsample"];
+
+/// Which scenes defaults were chosen on, and which they are judged on.
+pub fn halves(report: &Report) -> String {
+    let of = |half: Half| {
+        let names = report.scenes.iter().filter(|s| s.half == Some(half)).map(|s| s.name.as_str());
+        names.collect::<Vec<_>>().join(", ")
+    };
+    if report.scenes.iter().all(|scene| scene.half.is_none()) {
+        return "scenes of your own: in neither half".into();
+    }
+    format!("tuning half, on which the one default was chosen: {}\njudged half: {}", of(Half::Tuning), of(Half::Judged))
+}
+
+/// Times, then gains, for each number of directions.
+pub fn tables(lines: &[Line]) -> Vec<String> {
+    let mut directions: Vec<u32> = lines.iter().map(|l| l.directions).collect();
+    directions.dedup();
+    let each = |n: u32| {
+        let lines: Vec<&Line> = lines.iter().filter(|l| l.directions == n).collect();
+        [format!("N = {n}, milliseconds\n{}", times(&lines)), format!("N = {n}, speed-ups\n{}", speeds(&lines))]
+    };
+    directions.into_iter().flat_map(each).collect()
+}
+
+fn half(line: &Line) -> String {
+    line.half.map_or("", |half| if half == Half::Tuning { "tuning" } else { "judged" }).into()
+}
+
+fn times(lines: &[&Line]) -> String {
+    let row = |line: &&Line| {
+        let of = |name: &str| line.passes.iter().filter(|p| p.name == name).map(|p| p.ms).sum::<f64>();
+        let others: f64 = line.passes.iter().filter(|p| !PASSES.contains(&p.name)).map(|p| p.ms).sum();
+        let numbers = [line.full_ms, line.adaptive_ms].into_iter().chain(PASSES.map(of)).chain([others]);
+        let numbers = numbers.map(|ms| format!("{ms:.2}"));
+        let shaded = format!("{:.1} %", 100.0 * line.shaded_fraction);
+        [line.scene.clone(), half(line)].into_iter().chain(numbers).chain([shaded]).collect()
+    };
+    let header: Vec<&str> =
+        ["scene", "half", "full", "predicted"].into_iter().chain(PASSES).chain(["others", "shaded"]).collect();
+    aligned(&header, 2, lines.iter().map(row))
+}
+
+fn speeds(lines: &[&Line]) -> String {
+    let gained = |g: Option<Gained>| g.map_or(String::new(), |g| bounded(g.speed_up.factor, g.speed_up.is));
+    let wide = |g: Gained| format!("{} [{:.2}, {:.2}]", bounded(g.speed_up.factor, g.speed_up.is), g.interval[0], g.interval[1]);
+    let ratio = |r: Option<Ratio>| r.map_or(String::new(), |r| format!("{:.2}", r.ratio));
+    let row = |line: &&Line| {
+        let default = format!("bandwidth {}", line.directions);
+        let setting = line.best.as_ref().map_or("", |b| match b.variant == default {
+            true => "default",
+            // Between the rate's name and the number of directions.
+            false => b.variant.trim_start_matches("bandwidth ").rsplit_once(' ').map_or("", |(setting, _)| setting),
+        });
+        vec![
+            line.scene.clone(),
+            half(line),
+            ratio(line.equal_directions),
+            line.error_ratio.map_or(String::new(), |e| format!("{e:.2}")),
+            line.equal_error.map_or(String::new(), wide),
+            gained(line.best.as_ref().map(|b| b.gained)),
+            setting.to_string(),
+            gained(line.random),
+            gained(line.mis_alone),
+            gained(line.together),
+            format!("{:.1} %", 100.0 * line.overhead),
+            line.fall_back.map_or(String::new(), |r| format!("{:.3}", r.ratio)),
+        ]
+    };
+    let header = [
+        "scene",
+        "half",
+        "equal N",
+        "rmse",
+        "equal rmse",
+        "best",
+        "with",
+        "random",
+        "MIS alone",
+        "together",
+        "overhead",
+        "fall-back",
+    ];
+    aligned(&header, 2, lines.iter().map(row))
+}
+
+/// Each aim and whether it is met.
+pub fn targets(targets: &[Target]) -> String {
+    let row = |target: &Target| {
+        let verdict = match target.verdict {
+            Verdict::Passed => "passed",
+            Verdict::Missed => "missed",
+            Verdict::Undecided => "undecided",
+        };
+        let aim = format!("{} {}", if target.at_least { ">=" } else { "<=" }, target.aim);
+        let found = bounded(target.found.factor, target.found.is);
+        vec![verdict.into(), target.what.clone(), found, aim, target.scenes.to_string(), target.worst.clone()]
+    };
+    aligned(&["", "", "found", "aim", "scenes", "worst in"], 2, targets.iter().map(row))
+}
+
+/// What an environment would cost if it were another one in every frame.
+pub fn environments(scenes: &[SceneReport]) -> String {
+    let row = |scene: &SceneReport| {
+        let e = scene.environment.as_ref()?;
+        let ms = [e.bandwidth_ms, e.upload_ms, e.prepare_ms].map(|s| format!("{:.2}", s.median));
+        let record = scene.row("bandwidth 64").map_or(String::new(), |row| format!("{:.3}", row.record_ms.median));
+        let size = format!("{}x{}", e.extent[0], e.extent[1]);
+        Some([scene.name.clone(), size].into_iter().chain(ms).chain([record]).collect())
+    };
+    let header =
+        ["scene", "map", "environment_bandwidth ms", "upload ms", "CPU: tables ms", "CPU: recording a predicted frame ms"];
+    aligned(&header, 1, scenes.iter().filter_map(row))
+}

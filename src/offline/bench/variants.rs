@@ -1,0 +1,127 @@
+//! What is measured in a scene: ways of shading, each at several numbers of directions.
+
+use crate::offline::bench::runner::{Part, Variant};
+use crate::offline::render::Settings;
+use crate::{Config, Estimator, Rate};
+
+/// Some numbers of directions with the rest the same.
+pub struct Family {
+    name: &'static str,
+    part: Part,
+    rate: Rate,
+    oracle: bool,
+    estimator: Estimator,
+    /// In the place of a default.
+    change: fn(&mut Config),
+    /// Of the quick preset.
+    directions: &'static [u32],
+    /// Of the full one, besides.
+    more: &'static [u32],
+}
+
+/// Full rate with the default estimator.
+const FULL: Family = Family {
+    name: "full",
+    part: Part::Compared,
+    rate: Rate::Full,
+    oracle: false,
+    estimator: Estimator::Mis,
+    change: |_| (),
+    directions: &[64],
+    more: &[],
+};
+const HALF: Family = Family { name: "half", rate: Rate::Uniform(1), ..FULL };
+const BANDWIDTH: Family = Family { name: "bandwidth", rate: Rate::Bandwidth, ..FULL };
+
+/// What every pass costs, with and without levels. The first variant is the control's.
+pub const PASSES: &[Family] = &[FULL, HALF, BANDWIDTH];
+
+const fn compared(family: Family) -> Family {
+    Family { directions: &[64, 256], more: &[16], ..family }
+}
+
+/// One setting other than the default, in both presets.
+const fn setting(name: &'static str, change: fn(&mut Config)) -> Family {
+    Family { name, part: Part::Setting, change, ..BANDWIDTH }
+}
+
+/// One setting other than the default, in the full preset.
+const fn further(name: &'static str, change: fn(&mut Config)) -> Family {
+    Family { directions: &[], more: &[64], ..setting(name, change) }
+}
+
+/// Samples a cycle that no frame has: the prediction gives up, and what is left of its cost is what is of interest.
+const HOPELESS: f32 = 1e6;
+
+/// Full rate with each estimator is the ladder on which gains are found: it has more directions than the others, and fewer.
+pub const BAGHER: &[Family] = &[
+    Family { directions: &[64, 4, 16, 256], more: &[1024], ..FULL },
+    Family { name: "full brdf-random", estimator: Estimator::BrdfRandom, directions: &[16, 64, 256], more: &[1024], ..FULL },
+    compared(HALF),
+    compared(Family { name: "quarter", rate: Rate::Uniform(2), ..FULL }),
+    compared(Family { name: "luminance", rate: Rate::Luminance, ..FULL }),
+    compared(BANDWIDTH),
+    // Each is searched for anew.
+    Family { name: "oracle", rate: Rate::Given, oracle: true, more: &[16, 256], ..FULL },
+    Family { name: "bandwidth brdf-random", estimator: Estimator::BrdfRandom, more: &[256], ..BANDWIDTH },
+    Family {
+        name: "bandwidth falling back",
+        part: Part::FallBack,
+        change: |c| c.samples_per_cycle = Some(HOPELESS),
+        more: &[256],
+        ..BANDWIDTH
+    },
+    setting("bandwidth spc=1", |c| c.samples_per_cycle = Some(1.0)),
+    setting("bandwidth spc=4", |c| c.samples_per_cycle = Some(4.0)),
+    setting("bandwidth probes=1", |c| c.probes = 1),
+    further("bandwidth spc=1.4", |c| c.samples_per_cycle = Some(1.4)),
+    further("bandwidth spc=2.8", |c| c.samples_per_cycle = Some(2.8)),
+    further("bandwidth probes=16", |c| c.probes = 16),
+    further("bandwidth lmax=2", |c| c.lmax = 2),
+    further("bandwidth lmax=4", |c| c.lmax = 4),
+    further("bandwidth spc=1 lmax=4", |c| (c.samples_per_cycle, c.lmax) = (Some(1.0), 4)),
+    further("bandwidth spc=4 lmax=4", |c| (c.samples_per_cycle, c.lmax) = (Some(4.0), 4)),
+];
+
+/// All of `families`, in the place of what `base` says. `all` is for the full preset.
+pub fn variants(families: &[Family], base: &Settings, all: bool) -> Vec<Variant> {
+    let of = |family: &Family| {
+        let more = if all { family.more } else { &[] };
+        let variant = |directions: &u32| {
+            let Family { rate, estimator, .. } = *family;
+            let mut config = Config { rate, estimator, directions: *directions, ..base.config.clone() };
+            (family.change)(&mut config);
+            let settings = Settings { config, oracle: family.oracle, ..base.clone() };
+            Variant { name: format!("{} {directions}", family.name), part: family.part, settings }
+        };
+        family.directions.iter().chain(more).map(variant).collect::<Vec<_>>()
+    };
+    families.iter().flat_map(of).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::BTreeSet;
+
+    #[test]
+    fn names_are_apart_and_scenes_keep_their_own_settings() {
+        let base = Settings::new(Config { lmax: 5, geometric: true, ..Config::new([64, 64]) });
+        let quick = variants(BAGHER, &base, false);
+        let full = variants(BAGHER, &base, true);
+        let names = |all: &[Variant]| all.iter().map(|v| v.name.clone()).collect::<BTreeSet<_>>();
+        assert!(names(&quick).is_subset(&names(&full)) && names(&full).len() == full.len());
+        for variant in &full {
+            let config = &variant.settings.config;
+            assert!(config.geometric && (config.lmax == 5) != variant.name.contains("lmax"), "{}", variant.name);
+            assert_eq!(config.rate == Rate::Given, variant.settings.oracle, "{}", variant.name);
+        }
+        let changed = |v: &&Variant| v.part == Part::Setting;
+        for variant in full.iter().filter(changed) {
+            let [changed, default] = [&variant.settings.config, &base.config];
+            let same = (changed.samples_per_cycle, changed.probes, changed.lmax)
+                == (default.samples_per_cycle, default.probes, default.lmax);
+            assert!(!same, "{} is the default", variant.name);
+        }
+    }
+}
