@@ -2,12 +2,12 @@
 
 use glam::{DVec2, DVec3};
 use passband::frequency::operators::{Operator, Surface, pixel_angle};
-use passband::offline::bench::spectrum::{WINDOW, bandwidth};
+use passband::offline::bench::spectrum::{LEAST, WINDOW, bandwidth};
 use passband::offline::world::Camera;
 use std::f64::consts::TAU;
 
-/// Cycles/pixel below which the window's own spectrum is what is measured, and above which pixels alias.
-const RANGE: [f64; 2] = [0.07, 0.45];
+/// Cycles/pixel above which pixels alias.
+const MOST: f64 = 0.45;
 
 /// Radiance of each pixel that shows a unit ball in light `1 + cos(k angle from +X)`, and the bandwidth by the operator.
 pub fn seen(k: f64, size: usize) -> Vec<Option<(f64, f64)>> {
@@ -44,12 +44,12 @@ pub fn ratios(k: f64, size: usize) -> Vec<f64> {
             let window: Option<Vec<_>> = (0..WINDOW * WINDOW).map(pixel).collect();
             let Some(window) = window else { continue };
             // Its sharpest corner must not alias.
-            if window.iter().any(|(_, b)| *b > RANGE[1]) {
+            if window.iter().any(|(_, b)| *b > MOST) {
                 continue;
             }
             let measured = bandwidth(&window.iter().map(|w| Some(w.0)).collect::<Vec<_>>()).expect("the whole window has values");
             let (_, predicted) = window[WINDOW / 2 * WINDOW + WINDOW / 2];
-            if measured >= RANGE[0] {
+            if measured >= LEAST {
                 ratios.push(predicted / measured);
             }
         }

@@ -186,17 +186,25 @@ impl Stage<'_> {
         let grey = truth.rgb.iter().zip(&seen).map(|(c, seen)| seen.then(|| luminance(DVec3::from(c.map(f64::from)))));
         let frequency = layer(spectrum::map(&grey.collect::<Vec<_>>(), width as usize));
         let spread = layer(self.spread()?);
-        let ratio = |name: &str, measured: &LinearImage| covered_median(&predicted, name, measured);
+        let ratio = |name: &str, measured: &LinearImage, least| covered_median(&predicted, name, measured, least);
         let said = |what: &str, ratio: Option<f64>| match ratio {
-            Some(ratio) => format!("{what}, median of predicted over measured {ratio:.2}"),
-            None => format!("{what}, nowhere known"),
+            Some(ratio) => format!("{what}\nmedian of predicted over measured {ratio:.2}"),
+            None => format!("{what}\nnowhere known"),
         };
         let tiles = vec![
             heat(format!("spread by {} probes, 0 to {WIDEST}", patient.probes), &predicted, "spread.Y", WIDEST),
-            heat(said(&format!("spread of {MEASURED} samples"), ratio("spread.Y", &spread)), &spread, "Y", WIDEST),
+            heat(said(&format!("spread of {MEASURED} samples"), ratio("spread.Y", &spread, 0.0)), &spread, "Y", WIDEST),
             self.photograph(format!("PSNR {:.1} dB", shot.error.psnr), &shot),
             heat(format!("bandwidth predicted, 0 to {FASTEST} cycles a pixel"), &predicted, "bandwidth.Y", FASTEST),
-            heat(said("in windows of 32x32", ratio("bandwidth.Y", &frequency)), &frequency, "Y", FASTEST),
+            heat(
+                said(
+                    &format!("in windows of 32x32, above {} cycles a pixel", spectrum::LEAST),
+                    ratio("bandwidth.Y", &frequency, spectrum::LEAST),
+                ),
+                &frequency,
+                "Y",
+                FASTEST,
+            ),
             difference("difference, 4 times as displayed".into(), &picture(&shot.image), &truth, self.exposure()),
         ];
         let title = self.title("Figure 14: variance and bandwidth, predicted and measured");

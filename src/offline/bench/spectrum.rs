@@ -5,6 +5,8 @@ use std::f64::consts::{PI, TAU};
 
 /// Pixels a side of a window.
 pub const WINDOW: usize = 32;
+/// Cycles/pixel below which the window's own spectrum is what is measured.
+pub const LEAST: f64 = 0.07;
 /// Pixels between windows.
 const STEP: usize = 4;
 

@@ -105,10 +105,10 @@ pub fn mask(label: String, image: &LinearImage, channel: &str) -> Tile {
     Tile::of(label, image, layers[0].iter().zip(layers[1]).map(colour))
 }
 
-/// The median of a layer over the only layer `Y` of `measured`, where both are above 0.
-pub fn covered_median(predicted: &LinearImage, channel: &str, measured: &LinearImage) -> Option<f64> {
+/// The median of a layer over the only layer `Y` of `measured`, where the former is above 0 and the latter above `least`.
+pub fn covered_median(predicted: &LinearImage, channel: &str, measured: &LinearImage, least: f64) -> Option<f64> {
     let (predicted, measured) = (predicted.channel(channel)?, measured.channel("Y")?);
-    let both = predicted.iter().zip(measured).filter(|(p, m)| **p > 0.0 && **m > 0.0);
+    let both = predicted.iter().zip(measured).filter(|(p, m)| **p > 0.0 && f64::from(**m) > least);
     let mut ratios: Vec<f64> = both.map(|(p, m)| f64::from(*p) / f64::from(*m)).collect();
     ratios.sort_by(f64::total_cmp);
     ratios.get(ratios.len() / 2).copied()
@@ -133,8 +133,8 @@ mod tests {
         let hot = heat(name(), &image, "Y", 2.0).rgb;
         let sum = |i: usize| hot[i].iter().map(|b| u32::from(*b)).sum::<u32>();
         assert!(hot[2] == NOTHING && sum(0) < 20 && sum(0) < sum(3) && sum(3) < sum(1), "{hot:?}");
-        assert_eq!(covered_median(&layers(&[("level.Y", &[3.0; 4])]), "level.Y", &image), Some(3.0));
-        assert_eq!(covered_median(&image, "level.Y", &layers(&[])), None);
+        assert_eq!(covered_median(&layers(&[("level.Y", &[3.0; 4])]), "level.Y", &image, 1.5), Some(1.5));
+        assert_eq!(covered_median(&image, "level.Y", &layers(&[]), 0.0), None);
     }
 
     #[test]
