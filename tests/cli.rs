@@ -92,7 +92,7 @@ fn every_documented_flag_works_or_is_not_supported_yet() {
         ("--spc", "auto 2.5"),
         ("--seed", "0 4294967295"),
         ("--frames", "0..3"),
-        ("--literal", "eq8"),
+        ("--literal", "eq4 eq8 eq9"),
         ("--set", "camera.fov_y=40"),
         ("--reference", "16"),
         ("--stats", "stats.json"),
@@ -102,7 +102,7 @@ fn every_documented_flag_works_or_is_not_supported_yet() {
     for (flag, values) in choices {
         for value in values.split_whitespace() {
             // What the prediction finds is there where there is one.
-            let predicted = ["bandwidth", "spread"].contains(&value) && flag == "--aov";
+            let predicted = flag == "--literal" || ["bandwidth", "spread"].contains(&value) && flag == "--aov";
             let beside: &[&str] = match value {
                 _ if predicted => &["--rate", "bandwidth"],
                 "base" => &["--estimator", "preconvolved"],
@@ -139,6 +139,7 @@ fn every_documented_flag_works_or_is_not_supported_yet() {
         "--aov bandwidth",
         "--aov spread",
         "--frames 0..3",
+        "--literal eq8",
     ] {
         assert!(worked.iter().any(|w| w == flag), "{flag}");
     }

@@ -2,6 +2,8 @@
 
 use clap::ValueEnum;
 use indicatif::{ProgressBar, ProgressStyle};
+use passband::frequency::allocation::Allocation;
+use passband::frequency::operators::Combine;
 use passband::offline::error::{Error, Result};
 use passband::offline::headless::Options;
 use passband::offline::image_io::{LinearImage, check_writable, write_atomically, write_image};
@@ -58,9 +60,9 @@ pub struct Args {
     /// Frames A to B - 1 of an animation, to OUT.0000.exr and so on (a plain render is frame 0)
     #[arg(long, value_name = "A..B", value_parser = frames)]
     frames: Option<Range<u32>>,
-    /// A paper's own form of a step
+    /// A paper's own form of a step in the place of its correction, at --rate bandwidth
     #[arg(long, value_name = "NAME")]
-    literal: Vec<String>,
+    literal: Vec<Literal>,
     /// Override a key of the scene: camera.fov_y=40
     #[arg(long, value_name = "PATH=VALUE", value_parser = assignment)]
     set: Vec<(String, String)>,
@@ -90,6 +92,17 @@ enum Rate {
     Luminance,
     Bandwidth,
     Oracle,
+}
+
+/// Equations of Bagher et al. 2011.
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Literal {
+    /// Bandwidth as a mean that is weighted by what is reflected, but divided by the light alone
+    Eq4,
+    /// Directions by a bound on the integrand's variance (a scene's settings.np_rule = "eq8")
+    Eq8,
+    /// One sample a cycle, half of what a cycle needs
+    Eq9,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -174,7 +187,6 @@ fn assignment(text: &str) -> std::result::Result<(String, String), String> {
 impl Args {
     /// In the place of what the scene says in `base`.
     fn settings(&self, base: Config) -> Result<Settings> {
-        let later = |yes: bool, what: &str| if yes { Err(Error::NotSupportedYet { what: what.into() }) } else { Ok(()) };
         let rate = match self.rate {
             Rate::Full => passband::Rate::Full,
             Rate::Half => passband::Rate::Uniform(1),
@@ -200,11 +212,13 @@ impl Args {
             "tk" => Filter::Tk,
             _ => return Err(Error::NotSupportedYet { what: "--filter other than point and tk".into() }),
         };
-        later(!self.literal.is_empty(), "--literal")?;
+        let literal = |form| self.literal.contains(&form);
         let config = Config {
             rate,
             probes: self.probes.unwrap_or(base.probes),
-            samples_per_cycle: self.spc.0,
+            samples_per_cycle: self.spc.0.or(literal(Literal::Eq9).then_some(1.0)),
+            combine: if literal(Literal::Eq4) { Combine::Literal } else { base.combine },
+            allocation: if literal(Literal::Eq8) { Allocation::Equation8 } else { base.allocation },
             filter,
             directions: self.samples.unwrap_or(base.directions),
             estimator,
