@@ -102,7 +102,11 @@ pub fn targets(targets: &[Target]) -> String {
             Verdict::Undecided => "undecided",
         };
         let aim = format!("{} {}", if target.at_least { ">=" } else { "<=" }, target.aim);
-        let found = bounded(target.found.factor, target.found.is);
+        let found = match target.at_least {
+            true => bounded(target.found.factor, target.found.is),
+            // Shares and what is nearly 1: of times, which are no bounds.
+            false => format!("{:.3}", target.found.factor),
+        };
         vec![verdict.into(), target.what.clone(), found, aim, target.scenes.to_string(), target.worst.clone()]
     };
     aligned(&["", "", "found", "aim", "scenes", "worst in"], 2, targets.iter().map(row))

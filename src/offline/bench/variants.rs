@@ -56,7 +56,7 @@ const HOPELESS: f32 = 1e6;
 /// Full rate with each estimator is the ladder on which gains are found: it has more directions than the others, and fewer.
 pub const BAGHER: &[Family] = &[
     Family { directions: &[64, 4, 16, 256], more: &[1024], ..FULL },
-    Family { name: "full brdf-random", estimator: Estimator::BrdfRandom, directions: &[16, 64, 256], more: &[1024], ..FULL },
+    Family { name: "full brdf-random", estimator: Estimator::BrdfRandom, directions: &[64, 256], more: &[16, 1024], ..FULL },
     compared(HALF),
     compared(Family { name: "quarter", rate: Rate::Uniform(2), ..FULL }),
     compared(Family { name: "luminance", rate: Rate::Luminance, ..FULL }),
@@ -73,7 +73,7 @@ pub const BAGHER: &[Family] = &[
     },
     setting("bandwidth spc=1", |c| c.samples_per_cycle = Some(1.0)),
     setting("bandwidth spc=4", |c| c.samples_per_cycle = Some(4.0)),
-    setting("bandwidth probes=1", |c| c.probes = 1),
+    further("bandwidth probes=1", |c| c.probes = 1),
     further("bandwidth spc=1.4", |c| c.samples_per_cycle = Some(1.4)),
     further("bandwidth spc=2.8", |c| c.samples_per_cycle = Some(2.8)),
     further("bandwidth probes=16", |c| c.probes = 16),
