@@ -6,13 +6,16 @@ use crate::gpu::pipeline::BridgeLayouts;
 use crate::gpu::retire::{Build, Retired};
 use crate::pass::gbuffer::GBuffer;
 use crate::pass::{
-    PassContext, bandwidth, classify, curvature, environment_bandwidth, luminance, pyramid, resolve, shade, tonemap, upsample,
+    PassContext, bandwidth, brdf_map, classify, curvature, environment_bandwidth, luminance, pyramid, resolve, shade, tonemap,
+    upsample, vmf_mips,
 };
 use ash::vk;
 
 /// Passes of the frame.
 pub(crate) struct Passes {
     pub environment_bandwidth: Option<environment_bandwidth::EnvironmentBandwidth>,
+    /// Those over the maps of materials, if the filter stores moments.
+    pub moments: Option<(brdf_map::BrdfMap, vmf_mips::VmfMips)>,
     pub gbuffer: Option<GBuffer>,
     pub curvature: Option<curvature::Curvature>,
     pub bandwidth: Option<bandwidth::Bandwidth>,
@@ -39,6 +42,10 @@ impl Passes {
             environment_bandwidth: predicted
                 .then(|| environment_bandwidth::EnvironmentBandwidth::new(&mut p, config.eps))
                 .transpose()?,
+            moments: match config.filter.stored() {
+                Some(_) => Some((brdf_map::BrdfMap::new(&mut p, config.filter)?, vmf_mips::VmfMips::new(&mut p)?)),
+                None => None,
+            },
             gbuffer,
             curvature: config.curvature.then(|| curvature::Curvature::new(&mut p)).transpose()?,
             bandwidth: predicted.then(|| bandwidth::Bandwidth::new(&mut p, config)).transpose()?,
@@ -55,6 +62,10 @@ impl Passes {
     pub fn retire(self, bag: &mut Retired) {
         if let Some(pass) = self.environment_bandwidth {
             pass.retire(bag);
+        }
+        if let Some((map, mips)) = self.moments {
+            map.retire(bag);
+            mips.retire(bag);
         }
         if let Some(pass) = self.gbuffer {
             pass.retire(bag);

@@ -240,7 +240,7 @@ pub(super) fn report(
     let values = BTreeMap::from([
         ("rate", json!(settings.rate().name())),
         ("lmax", json!(config.lmax)),
-        ("filter", json!(if config.filter == Filter::Tk { "tk" } else { "point" })),
+        ("filter", json!(config.filter.name())),
         ("probes", json!(config.probes)),
         ("spc", json!(config.samples_per_cycle)),
         ("operator", json!(format!("{:?}", config.operator).to_lowercase())),

@@ -2,6 +2,7 @@
 //! pass, `new`, `record`.
 
 pub mod bandwidth;
+pub mod brdf_map;
 pub mod classify;
 pub mod curvature;
 pub mod environment;
@@ -20,6 +21,7 @@ pub mod resolve;
 pub mod shade;
 pub mod tonemap;
 pub mod upsample;
+pub mod vmf_mips;
 
 use crate::gpu::pipeline::{BridgeLayouts, Interface, Modules};
 use crate::gpu::retire::Build;
@@ -55,5 +57,6 @@ pub fn interfaces() -> Vec<Interface> {
     all.extend(tonemap::INTERFACES);
     all.extend(environment_bandwidth::INTERFACES);
     all.extend(luminance::INTERFACES);
+    all.extend([brdf_map::INTERFACE, vmf_mips::INTERFACE]);
     all
 }
