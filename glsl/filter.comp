@@ -1,11 +1,14 @@
 #version 460
 // What a surface is at the pixel's scale: the shading normal, factors on the reflectance's colours, its roughness and what the
 // surface's own curvature adds to it. Filter `point`: colours through their mips by the footprint, normals and roughness from
-// the base level; `tk` adds the kernel of the interpolated normals' derivatives. src/material.rs is the f64 twin.
+// the base level; `tk` adds the kernel of the interpolated normals' derivatives; the others read normals and concentrations as
+// moments, through mips too. src/material.rs and src/moments.rs are the f64 twins.
 #include "frame.glsl"
 #include "gbuffer.glsl"
 #include "tangent.glsl"
 #include "factors.glsl"
+#include "moments.glsl"
+#include "roughness.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
 
@@ -16,12 +19,18 @@ layout(constant_id = 2) const uint NORMAL_CLASSES = 0u;
 layout(constant_id = 3) const uint ROUGHNESS_CLASSES = 0u;
 // Whether the mesh's curvature within the pixel widens lobes.
 layout(constant_id = 4) const bool GEOMETRIC = false;
+// Classes of moments, and what of a texel's makes its lobe: FILTER_* of moments.glsl.
+layout(constant_id = 5) const uint MOMENT_CLASSES = 0u;
+layout(constant_id = 6) const uint FILTER = 0u;
 
 struct MapRecord {
     uvec4 places;  // albedo, specular, normal, roughness: 0 for none, else (layer << 3 | class) + 1
     vec2 tiling;   // factors on uv
     vec2 rule;     // of the roughness map; the greatest alpha that it gives
-    vec4 without;  // x: albedo factor without an albedo map
+    float without; // albedo factor without an albedo map
+    uint moments;  // as `places`
+    uint lobes;    // LOBES_* of moments.glsl
+    uint unused;
 };
 layout(set = 2, binding = 1, std430) readonly buffer Maps {
     MapRecord maps[]; // by material
@@ -36,13 +45,6 @@ layout(set = 2, binding = 8) uniform sampler2DArray textures_6;
 layout(set = 2, binding = 9) uniform sampler2DArray textures_7;
 layout(set = 2, binding = 10, rgba32f) uniform writeonly image2D normals;   // shading normal; tangent as tangent.glsl encodes it
 layout(set = 2, binding = 11, rgba32ui) uniform writeonly uimage2D factors; // as factors.glsl packs them
-
-// How a roughness map's value v becomes alpha, in the order of src/pass/maps.rs. A lobe's concentration is 2 / alpha^2, a
-// cosine's exponent 2 / alpha^2 - 2.
-const float RULE_KAPPA = 1.0;    // sqrt(2 / v)
-const float RULE_EXPONENT = 2.0; // sqrt(2 / (v + 2))
-const float LEAST_ALPHA = 1e-3;
-const float MOST_ALPHA = 6e4; // of a lobe without concentration, in 16-bit floating point
 
 // The level whose texels are as large as the longer derivative.
 float level(sampler2DArray t, vec4 footprint) {
@@ -71,12 +73,6 @@ vec4 look_up(uint classes, uint code, vec2 uv, vec4 footprint, bool base, vec4 w
     LOOK_UP(6)
     LOOK_UP(7)
     return value;
-}
-
-float alpha_by_rule(float rule, float v, float most) {
-    v = max(v, 0.0);
-    float alpha = rule == RULE_KAPPA ? sqrt(2.0 / v) : (rule == RULE_EXPONENT ? sqrt(2.0 / (v + 2.0)) : v);
-    return clamp(alpha, LEAST_ALPHA, most);
 }
 
 // Isotropic filtering of normal distributions by the derivatives of interpolated normals (Tokuyoshi and Kaplanyan 2021,
@@ -124,7 +120,7 @@ void main() {
     vec4 t = gbuffer_tangent(p);
 
     Factors f;
-    f.albedo = look_up(ALBEDO_CLASSES, record.places.x, uv, footprint, false, vec4(record.without.x)).rgb;
+    f.albedo = look_up(ALBEDO_CLASSES, record.places.x, uv, footprint, false, vec4(record.without)).rgb;
     f.specular = look_up(SPECULAR_CLASSES, record.places.y, uv, footprint, false, vec4(1.0)).rgb;
     f.alpha = NO_ALPHA;
     if (ROUGHNESS_CLASSES != 0u) {
@@ -140,6 +136,18 @@ void main() {
         vec3 local = vec3(xy, sqrt(max(1.0 - dot(xy, xy), 0.0)));
         vec3 bent = normalize(t.xyz * local.x + cross(n, t.xyz) * (t.w * local.y) + n * local.z);
         n = record.places.z != 0u && t.w != 0.0 ? bent : n;
+    }
+    if (MOMENT_CLASSES != 0u) {
+        vec4 moments = look_up(MOMENT_CLASSES, record.moments, uv, footprint, false, vec4(0.0));
+        if (FILTER == FILTER_FIXED) {
+            // The map's mean: its last level.
+            moments.w = look_up(MOMENT_CLASSES, record.moments, uv, vec4(1e4), false, vec4(0.0)).w;
+        }
+        float alpha = clamp(moments_alpha(FILTER, moments, record.lobes), LEAST_ALPHA, record.rule.y);
+        f.alpha = record.moments != 0u && record.lobes != LOBES_STAY ? alpha : f.alpha;
+        vec3 local = normalize(vec3(moments.xy, 1.0 - moments.z));
+        vec3 bent = normalize(t.xyz * local.x + cross(n, t.xyz) * (t.w * local.y) + n * local.z);
+        n = record.moments != 0u && t.w != 0.0 ? bent : n;
     }
     imageStore(normals, p, vec4(n, tangent_encode(n, t.xyz, t.w)));
     imageStore(factors, p, factors_pack(f));

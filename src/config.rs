@@ -1,5 +1,6 @@
 //! What a renderer is built for. Everything here is fixed until [`crate::Renderer::resize`] or a new renderer.
 
+use crate::distribution;
 use crate::error::{Error, Result};
 use crate::frequency::allocation::Allocation;
 use crate::frequency::environment::EPS;
@@ -45,7 +46,9 @@ pub enum Rate {
     Luminance,
 }
 
-/// How a material is read at a pixel's scale.
+/// How a material is read at a pixel's scale. Filters that read through mips turn GGX, Blinn-Phong and one vMF lobe about the
+/// normal into one lobe for each pixel, wherever the material has a map of normals or roughness; tables and other vMF mixtures
+/// keep their lobes about the mean normal ([`crate::Moments`]).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Filter {
     /// At the pixel's centre: colours through their mips, normals and roughness as they are there.
@@ -54,6 +57,39 @@ pub enum Filter {
     /// The same, with lobes widened by how far the interpolated normal turns within the pixel: geometric specular antialiasing
     /// (Tokuyoshi and Kaplanyan 2021). Tabulated reflectances stay as they are.
     Tk,
+    /// Normals and concentrations each averaged over the pixel, through their mips.
+    Naive,
+    /// Normals averaged over the pixel; the concentration is the map's mean.
+    Fixed,
+    /// The mean concentration, reduced by the length of the mean normal (Toksvig 2005, "Mipmapping Normal Maps").
+    Toksvig,
+    /// One von Mises-Fisher lobe of the pixel's mean vector (Xu et al. 2017).
+    Vmf1,
+}
+
+impl Filter {
+    /// All.
+    pub const ALL: [Self; 6] = [Self::Point, Self::Tk, Self::Naive, Self::Fixed, Self::Toksvig, Self::Vmf1];
+
+    /// The name by which it is asked for.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Point => "point",
+            Self::Tk => "tk",
+            Self::Naive | Self::Fixed | Self::Toksvig | Self::Vmf1 => self.stored().map_or("", |filter| filter.name()),
+        }
+    }
+
+    /// What it stores in a map's texels, if it reads normals and roughness through their mips.
+    pub fn stored(self) -> Option<distribution::Filter> {
+        match self {
+            Self::Point | Self::Tk => None,
+            Self::Naive => Some(distribution::Filter::Naive),
+            Self::Fixed => Some(distribution::Filter::Fixed),
+            Self::Toksvig => Some(distribution::Filter::Toksvig),
+            Self::Vmf1 => Some(distribution::Filter::Vmf1),
+        }
+    }
 }
 
 /// Where the G-buffer comes from.

@@ -10,6 +10,7 @@ pub mod gpu;
 mod inspect;
 pub mod light;
 pub mod material;
+pub mod moments;
 #[cfg(feature = "offline")]
 pub mod offline;
 pub mod pass;
@@ -33,6 +34,7 @@ pub use gpu::{
 };
 pub use light::Light;
 pub use material::{Maps, Material, PointMaterial, Roughness};
+pub use moments::Moments;
 pub use pass::gbuffer::Draw;
 pub use pass::tonemap::Transfer;
 pub use plan::{Footprint, FootprintRow, memory_footprint};

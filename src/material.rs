@@ -3,6 +3,7 @@
 use crate::error::{Error, Result};
 use crate::frequency::wavelet::Grid;
 use crate::frequency::{TextureBandwidth, TextureCells};
+use crate::moments::Moments;
 use crate::reflectance::half_row::Rows;
 use crate::reflectance::{BlinnPhong, Ggx, LobeBandwidth, Model, Reflectance};
 use crate::texture::{Format, Texture};
@@ -175,6 +176,17 @@ impl Material {
             roughness: roughness.as_ref().map(|(map, kind)| self.model.roughness_from(*kind, map.sample(place, 0.0).x)),
             kernel: 0.0,
         }
+    }
+
+    /// The same under the filter that `moments` belong to: normals and roughness come from these, at the level of their mips that
+    /// colours would be read at.
+    pub fn filtered_at(&self, moments: Option<&Moments>, uv: DVec2, footprint: [DVec2; 2]) -> PointMaterial {
+        let point = self.at(uv, footprint);
+        let Some(moments) = moments else { return point };
+        let tiling = DVec2::from(self.maps.tiling.map(f64::from));
+        let lod = lod(footprint.map(|d| d * tiling), moments.filtered().size(0));
+        let (normal, own) = moments.at(&self.model, uv * tiling, lod);
+        PointMaterial { normal, roughness: own.or(point.roughness), ..point }
     }
 }
 

@@ -7,8 +7,8 @@ use crate::gpu::pipeline::BridgeLayouts;
 use crate::gpu::retire::{Build, Retired};
 use crate::pass::gbuffer::GBuffer;
 use crate::pass::{
-    PassContext, allocate, bandwidth, base, classify, curvature, environment_bandwidth, luminance, prefilter, pyramid, resolve,
-    shade, tonemap, upsample,
+    PassContext, allocate, bandwidth, base, brdf_map, classify, curvature, environment_bandwidth, luminance, prefilter, pyramid,
+    resolve, shade, tonemap, upsample, vmf_mips,
 };
 use ash::vk;
 
@@ -16,6 +16,8 @@ use ash::vk;
 pub(crate) struct Passes {
     pub environment_bandwidth: Option<environment_bandwidth::EnvironmentBandwidth>,
     pub prefilter: Option<prefilter::Prefilter>,
+    /// Those over the maps of materials, if the filter stores moments.
+    pub moments: Option<(brdf_map::BrdfMap, vmf_mips::VmfMips)>,
     pub gbuffer: Option<GBuffer>,
     pub curvature: Option<curvature::Curvature>,
     pub bandwidth: Option<bandwidth::Bandwidth>,
@@ -61,6 +63,10 @@ impl Passes {
                 .then(|| environment_bandwidth::EnvironmentBandwidth::new(&mut p, config.eps))
                 .transpose()?,
             prefilter: looked_up.then(|| prefilter::Prefilter::new(&mut p)).transpose()?,
+            moments: match config.filter.stored() {
+                Some(_) => Some((brdf_map::BrdfMap::new(&mut p, config.filter)?, vmf_mips::VmfMips::new(&mut p)?)),
+                None => None,
+            },
             gbuffer,
             curvature: config.curvature.then(|| curvature::Curvature::new(&mut p)).transpose()?,
             bandwidth: predicted.then(|| bandwidth::Bandwidth::new(&mut p, config)).transpose()?,
@@ -80,6 +86,10 @@ impl Passes {
         }
         if let Some(pass) = self.prefilter {
             pass.retire(bag);
+        }
+        if let Some((map, mips)) = self.moments {
+            map.retire(bag);
+            mips.retire(bag);
         }
         if let Some(pass) = self.gbuffer {
             pass.retire(bag);

@@ -17,10 +17,11 @@ use crate::light;
 use crate::material::Material;
 use crate::pass::environment::{Analyses, EnvironmentImages, EnvironmentUpload};
 use crate::pass::gbuffer;
+use crate::pass::maps::Reading;
 use crate::pass::materials::{MaterialBridge, MaterialImages, MaterialsUpload};
 use crate::pass::{
-    FrameUniform, PassContext, allocate, bandwidth, base, classify, curvature, filter, level, luminance, pyramid, resolve, shade,
-    tonemap, upsample,
+    FrameUniform, PassContext, allocate, bandwidth, base, brdf_map, classify, curvature, filter, level, luminance, pyramid,
+    resolve, shade, tonemap, upsample, vmf_mips,
 };
 use crate::passes::{Passes, Sampled, layout};
 use crate::plan::{Directions, LIGHT_BYTES};
@@ -43,6 +44,8 @@ pub struct Renderer {
     pub(crate) config: Config,
     pub(crate) states: States,
     timer: GpuTimer,
+    /// Of the passes that materials' maps go through.
+    pub(crate) set_up: GpuTimer,
     timings: Option<FrameTimings>,
     pass_bytes: Vec<(&'static str, u64)>,
     pub(crate) samplers: Samplers,
@@ -76,7 +79,7 @@ impl Renderer {
         let cx = Context::new(host)?;
         let slots = config.frames_in_flight;
         let parts = Build::run(&cx, memory, |build| {
-            let timer = GpuTimer::new(build, slots)?;
+            let timers = (GpuTimer::new(build, slots)?, GpuTimer::new(build, 1)?);
             let samplers = Samplers::new(build)?;
             let bridge = MaterialBridge::new(build, slots)?;
             let mut upload = |name, size, usage| -> Result<Vec<Buffer>> {
@@ -85,14 +88,15 @@ impl Renderer {
             let uniforms = upload("frame", size_of::<FrameUniform>() as u64, vk::BufferUsageFlags::UNIFORM_BUFFER)?;
             let lights = upload("lights", LIGHT_BYTES, vk::BufferUsageFlags::STORAGE_BUFFER)?;
             let passes = Passes::new(build, config, bridge.layout)?;
-            Ok((timer, samplers, bridge, [uniforms, lights], passes, Targets::new(build, config)?))
+            Ok((timers, samplers, bridge, [uniforms, lights], passes, Targets::new(build, config)?))
         })?;
-        let (timer, samplers, bridge, [uniforms, lights], passes, targets) = parts;
+        let ((timer, set_up), samplers, bridge, [uniforms, lights], passes, targets) = parts;
         Ok(Self {
             cx,
             config: config.clone(),
             states: States::default(),
             timer,
+            set_up,
             timings: None,
             pass_bytes: Vec::new(),
             samplers,
@@ -150,20 +154,30 @@ impl Renderer {
     ) -> Result<Retired> {
         let bridge = BridgeLayouts { gbuffer: layout(&self.passes.gbuffer, &self.config), materials: self.bridge.layout };
         let (modules, slots, widened) = (&self.config.modules, self.config.frames_in_flight, self.config.widened());
+        let (filter, passes, samplers) = (self.config.filter, self.passes.moments.as_ref(), &self.samplers);
         let eps = (self.config.rate == Rate::Bandwidth).then_some(self.config.eps);
         if self.config.estimator == Estimator::Preconvolved {
             base::check_materials(materials)?;
         }
-        let (upload, filter) = Build::run(&self.cx, memory, |build| {
-            let upload = MaterialsUpload::new(build, materials, widened, eps)?;
-            let filter = filter::Filter::new(&mut PassContext { build, modules, bridge, slots }, upload.uses(), widened)?;
+        let (mut upload, filter) = Build::run(&self.cx, memory, |build| {
+            let upload = MaterialsUpload::new(build, materials, &Reading { filter, widened, passes, samplers }, eps)?;
+            let mut p = PassContext { build, modules, bridge, slots };
+            let filter = filter::Filter::new(&mut p, filter, upload.uses(), widened)?;
             Ok((upload, filter))
         })?;
         let mut bag = Retired::default();
-        let mut rec = Recorder::new(&self.cx, cmd, 0, &mut self.states, None);
+        self.set_up.restart(&self.cx, cmd, 0);
+        let mut rec = Recorder::new(&self.cx, cmd, 0, &mut self.states, Some(&mut self.set_up));
         rec.begin(crate::pass::materials::NAME);
+        let work = upload.work();
         let fresh = upload.record(&mut rec, &mut bag);
         rec.end();
+        if let (Some((map, mips)), Some((of_map, of_mips))) = (&self.passes.moments, work) {
+            map.record(&mut rec, &brdf_map::Io { maps: &fresh.maps }, &of_map);
+            mips.record(&mut rec, &vmf_mips::Io { maps: &fresh.maps }, &of_map, &of_mips);
+            of_map.retire(&mut bag);
+            of_mips.retire(&mut bag);
+        }
         if let Some((former, pass)) = self.materials.replace((fresh, filter)) {
             former.retire(&mut self.states, &mut bag);
             pass.retire(&mut bag);
@@ -407,6 +421,7 @@ impl Renderer {
         self.bridge.retire(&mut bag);
         self.samplers.retire(&mut bag);
         self.timer.retire(&mut bag);
+        self.set_up.retire(&mut bag);
         std::mem::forget(self.undestroyed);
         bag
     }

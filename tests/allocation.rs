@@ -36,7 +36,7 @@ type Entries<T> = Vec<(u32, T)>;
 fn shared(session: &mut Session, config: &Config) -> (Entries<f64>, Entries<u32>) {
     let count = session.shaded().unwrap() as usize;
     let (weights, [columns, _]) = texels(session, "prediction");
-    let side = config.samples_per_side.max(2) as usize;
+    let side = 2 * config.samples_per_side as usize;
     let weight = |entry: u32| {
         let [x, y] = [entry & 0x3fff, entry >> 14 & 0x3fff].map(|p| p as usize / side);
         weights[y * columns + x][2] + config.allocation.by_level() * f64::from(entry >> 28)

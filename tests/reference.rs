@@ -263,7 +263,8 @@ fn a_tighter_tolerance_stays_within_the_reported_error() {
 #[test]
 fn an_exhausted_budget_is_reported() {
     let world = world(noise(64, 32));
-    let image = render(&world, &Metal { alpha: 0.03 }, 8, Options { tolerance: 1e-9, max_evaluations: 5000 });
+    let image =
+        render(&world, &Metal { alpha: 0.03 }, 8, Options { tolerance: 1e-9, max_evaluations: 5000, ..Options::default() });
     assert!(some_pixels(&image, 10).iter().all(|i| image.error[*i] > 1e-9));
 }
 

@@ -7,8 +7,10 @@ use crate::distribution::mixture::{Masking, Mixture};
 use crate::distribution::partition::Cells;
 use crate::distribution::slope;
 use crate::distribution::vmf::{self, LEAST_SPREAD, Lobe};
+use crate::texture::bilinear;
 use glam::{DVec2, DVec3};
-use std::ops::Range;
+use std::borrow::Cow;
+use std::ops::{Add, Mul, Range};
 
 /// A filter. Those without `Lobe` take a texel's lobes as one whose normals spread; the others keep the same lobe of all texels
 /// apart.
@@ -156,7 +158,7 @@ impl Storage {
 #[derive(Clone, Debug)]
 pub struct Filtered<'a> {
     filter: Filter,
-    map: &'a BrdfMap,
+    map: Cow<'a, BrdfMap>,
     literal: bool,
     /// The mean concentration of the map.
     constant: f64,
@@ -168,6 +170,15 @@ impl<'a> Filtered<'a> {
     /// 8 and 9) and its tests of length (Algorithm 1, with the weights of equation 15, without which energy would grow with the
     /// number of cells).
     pub fn new(filter: Filter, map: &'a BrdfMap, literal: bool) -> Self {
+        Self::over(filter, Cow::Borrowed(map), literal)
+    }
+
+    /// The same, which keeps the map.
+    pub fn keeping(filter: Filter, map: BrdfMap, literal: bool) -> Filtered<'static> {
+        Filtered::over(filter, Cow::Owned(map), literal)
+    }
+
+    fn over(filter: Filter, map: Cow<'a, BrdfMap>, literal: bool) -> Self {
         let constant =
             map.lobes().iter().map(|l| l.weight * l.kappa).sum::<f64>() * map.lobes_per_texel() as f64 / map.lobes().len() as f64;
         let (slots, stride) = filter.storage().layout(map.lobes_per_texel());
@@ -195,6 +206,19 @@ impl<'a> Filtered<'a> {
         let mut out = vec![0.0; slots * stride];
         encode(self.filter.storage(), lobes, self.literal, &mut out);
         (!lobes.is_empty()).then_some(out)
+    }
+
+    /// What is stored at `uv`, linearly filtered within and between levels with repeat addressing; `v` grows upwards.
+    pub fn sample(&self, uv: DVec2, lod: f64) -> Vec<f64> {
+        let last = self.levels() - 1;
+        let lod = lod.clamp(0.0, last as f64);
+        let at = |level: usize| bilinear(self.size(level), uv, |i| Sum(self.texel(level, i).unwrap_or_default())).0;
+        let near = at(lod as usize);
+        if lod.fract() == 0.0 {
+            return near;
+        }
+        let far = at((lod as usize + 1).min(last));
+        near.iter().zip(far).map(|(a, b)| a + (b - a) * lod.fract()).collect()
     }
 
     /// The lobes of what is stored, or of an average of it.
@@ -266,6 +290,24 @@ impl<'a> Filtered<'a> {
         let Storage::Cells(own) = self.filter.storage() else { return None };
         let each = own.count() / coarser.count();
         (each > 0 && cell < coarser.count()).then(|| cell * each * CELL..(cell + 1) * each * CELL)
+    }
+}
+
+/// Stored numbers, added and scaled one by one.
+struct Sum(Vec<f64>);
+
+impl Add for Sum {
+    type Output = Self;
+    fn add(self, other: Self) -> Self {
+        Self(self.0.iter().zip(other.0).map(|(a, b)| a + b).collect())
+    }
+}
+
+impl Mul<f64> for Sum {
+    type Output = Self;
+    fn mul(mut self, factor: f64) -> Self {
+        self.0.iter_mut().for_each(|c| *c *= factor);
+        self
     }
 }
 

@@ -1,6 +1,6 @@
 //! Mips of linear quantities, at any size.
 
-use crate::texture::for_each_cover;
+use crate::texture::{for_each_cover, halved};
 
 /// A level: texels row by row, `channels` numbers each.
 #[derive(Clone, Debug)]
@@ -9,9 +9,9 @@ struct Level {
     texels: Vec<f64>,
 }
 
-/// The mips over a map whose texels are computed when they are asked for. Each side is half of the one before, rounded up, so
-/// that no texel has more than the area of two by two; each is the average of the area that it covers, so that the average of
-/// every level is that of the map at any size.
+/// The mips over a map whose texels are computed when they are asked for. Each side is half of the one before, rounded down, as
+/// a device's images have it; each texel is the average of the area that it covers, so that the average of every level is that
+/// of the map at any size. Twin of `glsl/vmf_mips.comp`.
 #[derive(Clone, Debug)]
 pub struct Mips {
     size: [u32; 2],
@@ -25,7 +25,7 @@ impl Mips {
         let mut mips = Self { size, channels, levels: Vec::new() };
         while mips.size(mips.levels.len()) != [1, 1] {
             let from = mips.size(mips.levels.len());
-            let to = from.map(|side| side.div_ceil(2));
+            let to = halved(from);
             let mut texels = vec![0.0; to[0] as usize * to[1] as usize * channels];
             let mut of_base = vec![0.0; channels];
             for_each_cover(from, to, |i, covered| {
@@ -73,11 +73,11 @@ mod tests {
         for size in [[1, 1], [2, 1], [5, 7], [67, 46], [64, 32]] {
             let value = |i: usize, c: usize| ((i * 7919 + c * 31) % 101) as f64;
             let mips = Mips::new(size, 2, |i, out| (0..2).for_each(|c| out[c] = value(i, c)));
-            assert_eq!(mips.levels(), 1 + size[0].max(size[1]).next_power_of_two().ilog2() as usize);
+            assert_eq!(mips.levels(), 1 + size[0].max(size[1]).ilog2() as usize);
             let count = (size[0] * size[1]) as usize;
             for level in 1..mips.levels() {
                 let [w, h] = mips.size(level);
-                assert_eq!([w, h], mips.size(level - 1).map(|side| side.div_ceil(2)));
+                assert_eq!([w, h], mips.size(level - 1).map(|side| (side / 2).max(1)));
                 // All of a level's texels have the same area.
                 for c in 0..2 {
                     let mean = (0..count).map(|i| value(i, c)).sum::<f64>() / count as f64;
@@ -88,9 +88,9 @@ mod tests {
             }
             assert!(mips.texel(0, 0).is_none() && mips.texel(mips.levels(), 0).is_none());
         }
-        // By hand: 3 texels to 2, each of which covers one and a half.
-        let mips = Mips::new([3, 1], 1, |i, out| out[0] = [1.0, 4.0, 10.0][i]);
-        for (i, expected) in [2.0, 8.0].into_iter().enumerate() {
+        // By hand: 5 texels to 2, each of which covers two and a half.
+        let mips = Mips::new([5, 1], 1, |i, out| out[0] = [1.0, 4.0, 10.0, 2.0, 6.0][i]);
+        for (i, expected) in [4.0, 5.2].into_iter().enumerate() {
             assert!((mips.texel(1, i).unwrap()[0] - expected).abs() < 1e-12);
         }
     }

@@ -25,7 +25,7 @@ impl Access {
     /// Written as a storage image or buffer by a compute shader.
     pub const COMPUTE_WRITE: Self =
         Self::new(vk::PipelineStageFlags2::COMPUTE_SHADER, vk::AccessFlags2::SHADER_STORAGE_WRITE, vk::ImageLayout::GENERAL);
-    /// Read and written by atomics in a compute shader.
+    /// Read and written by one dispatch of a compute shader: by atomics, or one level of an image from another.
     pub const COMPUTE_ATOMIC: Self = Self::new(
         vk::PipelineStageFlags2::COMPUTE_SHADER,
         vk::AccessFlags2::from_raw(

@@ -120,6 +120,25 @@ impl Image {
         Ok(Self { desc, handle, view, block })
     }
 
+    /// A view of all layers of each level, which the caller retires.
+    pub(crate) fn level_views(&self, build: &mut Build<'_>) -> Result<Vec<vk::ImageView>> {
+        let range = |base_mip_level| vk::ImageSubresourceRange {
+            aspect_mask: self.desc.aspect(),
+            base_mip_level,
+            level_count: 1,
+            layer_count: self.desc.layers.unwrap_or(1),
+            ..Default::default()
+        };
+        let kind = if self.desc.layers.is_some() { vk::ImageViewType::TYPE_2D_ARRAY } else { vk::ImageViewType::TYPE_2D };
+        let info = vk::ImageViewCreateInfo::default().image(self.handle).view_type(kind).format(self.desc.format);
+        let view = |level| {
+            // SAFETY: the image is bound.
+            let view = unsafe { build.cx.device.create_image_view(&info.subresource_range(range(level)), None) };
+            Ok(build.track(view.named("vkCreateImageView")?, Handle::View))
+        };
+        (0..self.desc.levels).map(view).collect()
+    }
+
     pub(crate) fn extent(&self) -> [u32; 2] {
         [self.desc.extent[0], self.desc.extent[1]]
     }

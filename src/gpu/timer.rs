@@ -46,7 +46,14 @@ impl GpuTimer {
 
     /// Results of the last frame in `slot`, which the host says has finished; then resets the slot's queries.
     pub fn begin_frame(&mut self, cx: &Context, cmd: vk::CommandBuffer, slot: usize) -> Result<Option<FrameTimings>> {
-        let Some(Slot { pool, names }) = self.slots.get_mut(slot) else { return Ok(None) };
+        let timings = self.results(cx, slot)?;
+        self.restart(cx, cmd, slot);
+        Ok(timings)
+    }
+
+    /// Results of the last work in `slot`, which has finished.
+    pub fn results(&self, cx: &Context, slot: usize) -> Result<Option<FrameTimings>> {
+        let Some(Slot { pool, names }) = self.slots.get(slot) else { return Ok(None) };
         let mut ticks = vec![[0u64; 2]; names.len()];
         let mut timings = None;
         if !names.is_empty() {
@@ -59,10 +66,15 @@ impl GpuTimer {
                 Err(result) => return Err(crate::Error::Vulkan { call: "vkGetQueryPoolResults", result }),
             }
         }
+        Ok(timings)
+    }
+
+    /// Resets the slot's queries, whether they were read or not.
+    pub fn restart(&mut self, cx: &Context, cmd: vk::CommandBuffer, slot: usize) {
+        let Some(Slot { pool, names }) = self.slots.get_mut(slot) else { return };
         names.clear();
         // SAFETY: the command buffer is recording outside a render pass.
         unsafe { cx.device.cmd_reset_query_pool(cmd, *pool, 0, 2 * MAX_SCOPES) };
-        Ok(timings)
     }
 
     /// Opens a scope; [`Self::end`] closes the last one.

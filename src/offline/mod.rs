@@ -18,6 +18,7 @@ pub mod mesh;
 pub mod metrics;
 pub mod rates;
 mod read_back;
+pub use read_back::MomentLevels;
 pub mod reference;
 pub mod render;
 pub mod scene;

@@ -11,6 +11,9 @@ use crate::offline::session::{Session, closed};
 use crate::renderer::Renderer;
 use ash::vk;
 
+/// Size and texels of each level.
+pub type MomentLevels = Vec<([u32; 2], Vec<[f32; 4]>)>;
+
 impl Session {
     /// The number of samples that the last frame shaded.
     ///
@@ -52,6 +55,29 @@ impl Session {
         Ok((bytes, format, extent))
     }
 
+    /// What the filter stores of a material, if it stores anything: size and texels of each level, row by row, as
+    /// `glsl/include/moments.glsl` says.
+    ///
+    /// # Errors
+    /// The device's.
+    pub fn moments(&mut self, material: usize) -> Result<Option<MomentLevels>> {
+        let renderer = self.renderer.as_ref().ok_or_else(closed)?;
+        let Some((image, layer)) = renderer.moments(material) else { return Ok(None) };
+        let desc = image.desc;
+        (0..desc.levels)
+            .map(|level| {
+                let [width, height, _] = desc.level_extent(level);
+                let bytes = self.read(u64::from(width) * u64::from(height) * 16, |renderer, rec, target| {
+                    if let Some((image, _)) = renderer.moments(material) {
+                        copy_level(rec, image, target, level, layer);
+                    }
+                })?;
+                Ok(([width, height], bytemuck::pod_collect_to_vec(&bytes)))
+            })
+            .collect::<Result<_>>()
+            .map(Some)
+    }
+
     /// What `record` copies into a host-visible buffer of `size` bytes.
     pub(super) fn read(&mut self, size: u64, record: impl FnOnce(&Renderer, &mut Recorder<'_>, &Buffer)) -> Result<Vec<u8>> {
         let renderer = self.renderer.as_mut().ok_or_else(closed)?;
@@ -81,11 +107,20 @@ impl Session {
 }
 
 fn copy_image(rec: &mut Recorder<'_>, image: &Image, target: &Buffer) {
+    copy_level(rec, image, target, 0, 0);
+}
+
+fn copy_level(rec: &mut Recorder<'_>, image: &Image, target: &Buffer, level: u32, layer: u32) {
     rec.image(image, Access::TRANSFER_READ);
     rec.buffer(target, Access::TRANSFER_WRITE);
     rec.flush();
-    let [width, height] = image.extent();
-    let layers = vk::ImageSubresourceLayers { aspect_mask: image.desc.aspect(), layer_count: 1, ..Default::default() };
+    let [width, height, _] = image.desc.level_extent(level);
+    let layers = vk::ImageSubresourceLayers {
+        aspect_mask: image.desc.aspect(),
+        mip_level: level,
+        base_array_layer: layer,
+        layer_count: 1,
+    };
     let extent = vk::Extent3D { width, height, depth: 1 };
     let region = vk::BufferImageCopy { image_subresource: layers, image_extent: extent, ..Default::default() };
     let layout = Access::TRANSFER_READ.layout;

@@ -11,7 +11,7 @@ use crate::offline::rates;
 use crate::offline::session::Session;
 use crate::offline::stats::{Pixels, Quantiles, Samples, Stats, pass_times};
 use crate::offline::world::World;
-use crate::{Config, Estimator, Filter, Rate, Requirements};
+use crate::{Config, Estimator, Rate, Requirements};
 use serde_json::json;
 use std::collections::BTreeMap;
 
@@ -203,7 +203,7 @@ pub(super) fn report(
     let values = BTreeMap::from([
         ("rate", json!(settings.rate())),
         ("lmax", json!(config.lmax)),
-        ("filter", json!(if config.filter == Filter::Tk { "tk" } else { "point" })),
+        ("filter", json!(config.filter.name())),
         ("probes", json!(config.probes)),
         ("spc", json!(config.samples_per_cycle)),
         ("operator", json!(format!("{:?}", config.operator).to_lowercase())),

@@ -134,7 +134,12 @@ impl Session {
         }
         // SAFETY: the command buffer is recording and submitted at once.
         headless.submit(|cmd, memory| Ok(unsafe { renderer.record_materials(cmd, &materials, memory) }?))?;
-        setup.push((crate::pass::materials::NAME, milliseconds(clock)));
+        // Beside the work on the processor, with which the rest of it is told.
+        let of_maps = |name: &&str| [crate::pass::brdf_map::NAME, crate::pass::vmf_mips::NAME].contains(name);
+        let on_device: SetupTimes = renderer.set_up_times()?.passes.into_iter().filter(|(name, _)| of_maps(name)).collect();
+        let others: f64 = on_device.iter().map(|(_, time)| time).sum();
+        setup.push((crate::pass::materials::NAME, milliseconds(clock) - others));
+        setup.extend(on_device);
 
         let clock = Instant::now();
         let dark = LatLong::new(1, 1, vec![[0.0; 3]])?;

@@ -1,5 +1,6 @@
 //! Pass 2: what the surfaces' textures say at the pixel's scale: shading normals, factors and roughness.
 
+use crate::config;
 use crate::error::Result;
 use crate::gpu::access::Access;
 use crate::gpu::buffer::Buffer;
@@ -8,8 +9,8 @@ use crate::gpu::pipeline::{BridgeSets, ComputePipeline, Interface, Resource};
 use crate::gpu::recorder::Recorder;
 use crate::gpu::retire::Retired;
 use crate::gpu::sampler::Samplers;
-use crate::pass::PassContext;
 use crate::pass::maps::{MapImages, Uses};
+use crate::pass::{PassContext, brdf_map};
 use crate::texture::classes::MAX_CLASSES;
 use ash::vk::DescriptorType as D;
 
@@ -55,9 +56,9 @@ pub(crate) struct Filter(ComputePipeline);
 
 impl Filter {
     /// `geometric` says whether the mesh's curvature widens lobes.
-    pub fn new(p: &mut PassContext<'_, '_>, uses: Uses, geometric: bool) -> Result<Self> {
-        let [albedo, specular, normal, roughness] = uses;
-        let constants = [albedo, specular, normal, roughness, u32::from(geometric)];
+    pub fn new(p: &mut PassContext<'_, '_>, filter: config::Filter, uses: Uses, geometric: bool) -> Result<Self> {
+        let [albedo, specular, normal, roughness, moments] = uses;
+        let constants = [albedo, specular, normal, roughness, u32::from(geometric), moments, brdf_map::number(filter)];
         Ok(Self(ComputePipeline::new(p.build, p.modules, &INTERFACE, p.bridge, p.slots, &constants)?))
     }
 

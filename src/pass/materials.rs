@@ -9,8 +9,10 @@ use crate::gpu::recorder::{Recorder, States};
 use crate::gpu::retire::{Build, Handle, Retired};
 use crate::gpu::sampler::Samplers;
 use crate::gpu::upload::{BufferUpload, ImageUpload};
-use crate::material::Material;
-use crate::pass::maps::{MapImages, MapsUpload, Uses};
+use crate::material::{MOST_KERNEL, Material};
+use crate::moments::most_added;
+use crate::pass::maps::{MapImages, MapsUpload, Reading, Uses};
+use crate::pass::{brdf_map, vmf_mips};
 use crate::reflectance::ladder::{Ladder, own_square};
 use crate::reflectance::merl::{PHI_DIFF, THETA_DIFF, THETA_HALF};
 use crate::reflectance::{Lobe, MerlTable, Model, atlas, bandwidth};
@@ -186,8 +188,8 @@ fn bandwidths(
 }
 
 impl MaterialsUpload {
-    /// `widened` says whether a filter widens lobes, `eps` at which threshold bandwidths are analysed, if the frame predicts it.
-    pub fn new(build: &mut Build<'_>, materials: &[Material], widened: bool, eps: Option<f64>) -> Result<Self> {
+    /// `reading` says how their maps are read, `eps` at which threshold bandwidths are analysed, if the frame predicts it.
+    pub fn new(build: &mut Build<'_>, materials: &[Material], reading: &Reading<'_>, eps: Option<f64>) -> Result<Self> {
         if materials.is_empty() || materials.len() > MAX_MATERIALS {
             return Err(Error::invalid("materials", format!("1 to {MAX_MATERIALS}"), materials.len()));
         }
@@ -203,7 +205,8 @@ impl MaterialsUpload {
             .ok_or_else(|| Error::invalid("materials", format!("tables that fit a 3-D image of side {limit}"), tables.all.len()))?
             .1;
         let packed: Vec<_> = tables.all.iter().map(|(table, scale)| table.packed_at(*scale)).collect();
-        let ladders: Vec<_> = materials.iter().map(|m| Ladder::of(m, widened)).collect();
+        let kernel = if reading.widened { MOST_KERNEL } else { 0.0 };
+        let ladders: Vec<_> = materials.iter().map(|m| Ladder::of(m, kernel + most_added(m, reading.filter))).collect();
         let firsts = ladders.iter().scan(0, |next, ladder| Some(std::mem::replace(next, *next + ladder.steps())));
         let places: Vec<_> = ladders.iter().zip(firsts).map(|(ladder, first)| ladder.record(first)).collect();
         let mut records = records(materials, &tables, &places, size[0]);
@@ -229,7 +232,7 @@ impl MaterialsUpload {
                 image("importance density", vk::Format::R16_SFLOAT, density_extent),
                 bytemuck::cast_slice(&density),
             )?,
-            maps: MapsUpload::new(build, materials)?,
+            maps: MapsUpload::new(build, materials, reading)?,
             bandwidths,
         })
     }
@@ -237,6 +240,11 @@ impl MaterialsUpload {
     /// Classes that hold maps of each kind.
     pub fn uses(&self) -> Uses {
         self.maps.uses
+    }
+
+    /// The sets of the passes over the maps, which run after [`Self::record`].
+    pub fn work(&mut self) -> Option<(brdf_map::Work, vmf_mips::Work)> {
+        self.maps.work.take()
     }
 
     pub fn record(self, rec: &mut Recorder<'_>, bag: &mut Retired) -> MaterialImages {

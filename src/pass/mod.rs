@@ -4,6 +4,7 @@
 pub mod allocate;
 pub mod bandwidth;
 pub mod base;
+pub mod brdf_map;
 pub mod classify;
 pub mod curvature;
 pub mod environment;
@@ -23,6 +24,7 @@ pub mod resolve;
 pub mod shade;
 pub mod tonemap;
 pub mod upsample;
+pub mod vmf_mips;
 
 use crate::gpu::pipeline::{BridgeLayouts, Interface, Modules};
 use crate::gpu::retire::Build;
@@ -60,5 +62,6 @@ pub fn interfaces() -> Vec<Interface> {
     all.extend(environment_bandwidth::INTERFACES);
     all.extend(luminance::INTERFACES);
     all.extend(prefilter::INTERFACES);
+    all.extend([brdf_map::INTERFACE, vmf_mips::INTERFACE]);
     all
 }

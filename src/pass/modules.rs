@@ -18,6 +18,8 @@ macro_rules! modules {
 modules! {
     "gbuffer.vert",
     "gbuffer.frag",
+    "brdf_map.comp",
+    "vmf_mips.comp",
     "filter.comp",
     "curvature.comp",
     "bandwidth.blocks.comp",

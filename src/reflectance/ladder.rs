@@ -1,6 +1,6 @@
 //! The importance tables of a material: one, or where maps or a filter vary its roughness a ladder of them.
 
-use crate::material::{MOST_KERNEL, Material, PointMaterial};
+use crate::material::{Material, PointMaterial};
 use crate::reflectance::{ImportanceTable, Model};
 use glam::{DVec2, DVec3};
 use half::f16;
@@ -22,18 +22,17 @@ pub struct Ladder {
 }
 
 impl Ladder {
-    /// Of a valid material, to whose alpha squared a filter may add up to [`MOST_KERNEL`] if `widened`. Colour maps count with
-    /// their mean.
-    pub fn of(material: &Material, widened: bool) -> Self {
+    /// Of a valid material, to whose alpha squared a filter may add up to `added`. Colour maps count with their mean.
+    pub fn of(material: &Material, added: f64) -> Self {
         let own = own_square(&material.model);
         let mapped = material.roughness_range();
-        let (Some(_), true) = (own, widened || mapped.is_some()) else {
+        let (Some(_), true) = (own, added > 0.0 || mapped.is_some()) else {
             return Self { points: vec![material.mean(None, 0.0)], first: 0.0, steps_per_log2: 0.0 };
         };
         let own = own.unwrap_or_default();
         let most = if matches!(material.model, Model::Vmf(_)) { 16.0 } else { 1.0 };
         let (low, high) = mapped.unwrap_or((own, own));
-        let high = if widened { high + MOST_KERNEL } else { high };
+        let high = high + added;
         let [first, last] = [low, high].map(|square: f64| square.min(most).log2());
         let steps = (((last - first) / STEP).ceil() as usize + 1).clamp(1, MOST_STEPS);
         let steps_per_log2 = if last > first { (steps - 1) as f64 / (last - first) } else { 0.0 };
@@ -119,6 +118,7 @@ impl Material {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::material::MOST_KERNEL;
     use crate::reflectance::Ggx;
     use crate::{Maps, Roughness, Texture};
     use std::sync::Arc;
@@ -127,18 +127,18 @@ mod tests {
     fn steps_span_the_roughness_of_the_map() {
         let ggx = Ggx { alpha: 0.3, f0: DVec3::ONE, albedo: DVec3::ZERO };
         let plain = Material::from(Model::Ggx(ggx));
-        assert_eq!(Ladder::of(&plain, false).record(7), [7.0, 0.0, 0.0, 0.0]);
+        assert_eq!(Ladder::of(&plain, 0.0).record(7), [7.0, 0.0, 0.0, 0.0]);
         let map = |values: &[f32]| Some((Arc::new(Texture::scalar([2, 1], values).unwrap()), Roughness::Alpha));
         let with = |values: &[f32]| Material { maps: Maps { roughness: map(values), ..Maps::default() }, ..plain.clone() };
         // Alpha from 1/8 to 1/2 in steps of half a log2.
-        let ladder = Ladder::of(&with(&[0.5, 0.125]), false);
+        let ladder = Ladder::of(&with(&[0.5, 0.125]), 0.0);
         assert_eq!(ladder.record(0), [0.0, 4.0, -6.0, 1.0]);
         let alphas: Vec<_> = ladder.points.iter().map(|p| p.roughness.unwrap()).collect();
         assert!((alphas[0] - 0.125).abs() < 1e-9 && (alphas[4] - 0.5).abs() < 1e-9 && (alphas[2] - 0.25).abs() < 1e-9);
-        assert_eq!(Ladder::of(&with(&[0.25, 0.25]), false).steps(), 1);
-        assert_eq!(Ladder::of(&with(&[0.0, 1.0]), false).steps(), MOST_STEPS);
+        assert_eq!(Ladder::of(&with(&[0.25, 0.25]), 0.0).steps(), 1);
+        assert_eq!(Ladder::of(&with(&[0.0, 1.0]), 0.0).steps(), MOST_STEPS);
         // A kernel widens from the model's own: 0.09 to 0.27.
-        let widened = Ladder::of(&plain, true);
+        let widened = Ladder::of(&plain, MOST_KERNEL);
         assert_eq!((widened.steps(), widened.points[0].kernel, widened.points[0].roughness), (3, 0.0, None));
         assert!((widened.points[2].kernel - MOST_KERNEL).abs() < 1e-9);
     }

@@ -29,6 +29,11 @@ pub(super) fn encode_byte(linear: f32) -> u8 {
     BETWEEN.partition_point(|bound| *bound <= linear) as u8
 }
 
+/// The size of the next level: each side half, rounded down, at least 1.
+pub(crate) fn halved(size: [u32; 2]) -> [u32; 2] {
+    size.map(|side| (side / 2).max(1))
+}
+
 /// A texture and its mips: each texel of a level is the average of the area that it covers of the level before, whose side
 /// need not be even. Averages are taken before they are rounded to the format.
 pub(super) fn chain<const N: usize>(format: Format, size: [u32; 2], source: impl Fn(usize) -> [f32; N]) -> Texture {
@@ -42,7 +47,7 @@ pub(super) fn chain<const N: usize>(format: Format, size: [u32; 2], source: impl
     let mut known = [size[0], size[1]];
     let mut before: Option<Vec<[f32; N]>> = None;
     while known != [1, 1] {
-        let next = known.map(|side| (side / 2).max(1));
+        let next = halved(known);
         // Of the first level there is no copy beside the caller's.
         let averages = match &before {
             None => averages(known, next, &source),

@@ -1,7 +1,7 @@
 //! Which array of layers holds each texture: one array a size and format, few enough for a fixed set of bindings.
 
 use crate::material::Material;
-use crate::texture::{Format, Texture};
+use crate::texture::{Format, Texture, halved};
 use std::sync::Arc;
 
 /// Arrays that one set of materials may have.
@@ -45,6 +45,11 @@ impl Classes {
     /// [`MAX_CLASSES`] sizes and formats, those whose union costs the fewest bytes become one: the smaller are resampled to
     /// the larger size, bilinear, in linear light.
     pub fn of(materials: &[Material]) -> Self {
+        Self::within(materials, MAX_CLASSES)
+    }
+
+    /// The same with at most `most` arrays, which are no fewer than there are formats.
+    pub(crate) fn within(materials: &[Material], most: usize) -> Self {
         let mut textures: Vec<Arc<Texture>> = Vec::new();
         for material in materials {
             for texture in material.maps.textures().into_iter().flatten() {
@@ -53,7 +58,7 @@ impl Classes {
                 }
             }
         }
-        let groups = groups(&textures);
+        let groups = groups(&textures, most);
         let mut classes: Vec<Class> = Vec::with_capacity(groups.len());
         let mut places = vec![(0, 0); textures.len()];
         for (number, group) in groups.into_iter().enumerate() {
@@ -106,12 +111,12 @@ fn bytes(format: Format, mut size: [u32; 2]) -> u64 {
         if size == [1, 1] {
             return texels * format.bytes() as u64;
         }
-        size = size.map(|side| (side / 2).max(1));
+        size = halved(size);
     }
 }
 
-/// At most [`MAX_CLASSES`] groups: there are fewer formats than that.
-fn groups(textures: &[Arc<Texture>]) -> Vec<Group> {
+/// At most `most` groups: there are no more formats than that.
+fn groups(textures: &[Arc<Texture>], most: usize) -> Vec<Group> {
     let mut groups: Vec<Group> = Vec::new();
     for (number, texture) in textures.iter().enumerate() {
         let (size, format) = (texture.size(), texture.format());
@@ -120,7 +125,7 @@ fn groups(textures: &[Arc<Texture>]) -> Vec<Group> {
             None => groups.push(Group { size, format, members: vec![number] }),
         }
     }
-    while groups.len() > MAX_CLASSES {
+    while groups.len() > most {
         let pairs = (0..groups.len()).flat_map(|b| (0..b).map(move |a| (a, b)));
         let alike = pairs.filter(|&(a, b)| groups[a].format == groups[b].format);
         let Some((a, b)) = alike.min_by_key(|&(a, b)| groups[a].union(&groups[b]).1) else { break };

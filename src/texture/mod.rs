@@ -7,7 +7,7 @@ pub mod classes;
 
 use crate::error::{Error, Result};
 use chain::{chain, encode_byte};
-pub(crate) use chain::{decode_byte, for_each_cover};
+pub(crate) use chain::{decode_byte, for_each_cover, halved};
 use glam::{DVec2, DVec4, dvec4};
 use half::f16;
 

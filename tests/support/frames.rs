@@ -111,7 +111,17 @@ pub struct Expected {
 
 /// The f64 reference at the interior pixels that `choose` picks, where a rasteriser and a ray caster see the same surface.
 pub fn expected(world: &World, extent: [u32; 2], choose: impl Fn(Vec<usize>) -> Vec<usize>) -> Expected {
-    let reference = Reference::new(world, extent, quadrature::Options::default()).unwrap();
+    expected_with(world, extent, quadrature::Options::default(), choose)
+}
+
+/// The same with other options.
+pub fn expected_with(
+    world: &World,
+    extent: [u32; 2],
+    options: quadrature::Options,
+    choose: impl Fn(Vec<usize>) -> Vec<usize>,
+) -> Expected {
+    let reference = Reference::new(world, extent, options).unwrap();
     let hits = reference.hits().to_vec();
     let image = ReferenceImage { extent, hits, radiance: vec![], coverage: vec![], error: vec![], evaluations: 0 };
     let interior = image.interior();

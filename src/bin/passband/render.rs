@@ -207,11 +207,8 @@ impl Args {
         if !FILTERS.contains(&self.filter.as_str()) && self.filter != "supersample" {
             return Err(Error::argument("--filter", format!("one of {}, supersample", FILTERS.join(", ")), &self.filter));
         }
-        let filter = match self.filter.as_str() {
-            "point" => Filter::Point,
-            "tk" => Filter::Tk,
-            _ => return Err(Error::NotSupportedYet { what: "--filter other than point and tk".into() }),
-        };
+        let filter = Filter::ALL.into_iter().find(|filter| filter.name() == self.filter);
+        let filter = filter.ok_or_else(|| Error::NotSupportedYet { what: format!("--filter {}", self.filter) })?;
         let literal = |form| self.literal.contains(&form);
         let config = Config {
             rate,

@@ -1,5 +1,6 @@
 //! Direct light at one point by globally adaptive quadrature.
 
+use crate::config::Filter;
 use crate::offline::reference::environment::{Parts, Region, Tree};
 use crate::reflectance::Reflectance;
 use glam::{DMat3, DVec3};
@@ -13,11 +14,13 @@ pub struct Options {
     pub tolerance: f64,
     /// Reflectance evaluations after which a pixel is given up; its [`Estimate::error`] then exceeds the tolerance.
     pub max_evaluations: u64,
+    /// How materials are read. What [`Filter::Tk`] adds is a frame's own: its hits have a kernel of 0.
+    pub filter: Filter,
 }
 
 impl Default for Options {
     fn default() -> Self {
-        Self { tolerance: 1e-3, max_evaluations: 5_000_000 }
+        Self { tolerance: 1e-3, max_evaluations: 5_000_000, filter: Filter::Point }
     }
 }
 

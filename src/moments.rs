@@ -1,0 +1,125 @@
+//! What the filters that read through mips make of a material's normals and roughness, in f64: twin of the passes `brdf_map` and
+//! `vmf_mips` and of what `filter` decodes.
+
+use crate::config::Filter;
+use crate::distribution::effective::Rule;
+use crate::distribution::{BrdfMap, Filtered, Mixture, vmf};
+use crate::material::{LEAST_ALPHA, MOST_CONCENTRATION, Maps, Material};
+use crate::reflectance::{Ggx, Model};
+use crate::texture::Texture;
+use glam::{DVec2, DVec3};
+use std::sync::Arc;
+
+/// What of a material's lobes is filtered.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Base {
+    /// One lobe about the normal, of this spread where there is no map of roughness.
+    Lobe {
+        /// [`vmf::spread`].
+        spread: f64,
+    },
+    /// Normals only: lobes that one parameter does not describe stay as they are.
+    Normals,
+}
+
+/// How one lobe's concentration becomes alpha.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Parameter {
+    /// sqrt(2 / concentration).
+    Alpha,
+    /// That of a cosine power, whose mean cosine is exact: sqrt(2 spread).
+    Exponent,
+}
+
+impl Base {
+    /// Of a material that has something to filter.
+    pub fn of(material: &Material) -> Option<Self> {
+        let maps = &material.maps;
+        let base = match &material.model {
+            Model::Ggx(ggx) => Self::Lobe { spread: vmf::spread(2.0 / ggx.alpha.max(LEAST_ALPHA).powi(2)) },
+            Model::BlinnPhong(blinn_phong) => Self::Lobe { spread: 1.0 / (blinn_phong.exponent + 2.0) },
+            Model::Vmf(mixture) => match mixture.lobes() {
+                [lobe] if lobe.mu.z > 1.0 - 1e-9 => Self::Lobe { spread: vmf::spread(lobe.kappa) },
+                _ => Self::Normals,
+            },
+            Model::Table(_) | Model::Turned(_) => Self::Normals,
+        };
+        (maps.normal.is_some() || base != Self::Normals && maps.roughness.is_some()).then_some(base)
+    }
+
+    /// The map of roughness that counts.
+    pub fn roughness(self, material: &Material) -> Option<&Arc<Texture>> {
+        material.maps.roughness.as_ref().filter(|_| self != Self::Normals).map(|(map, _)| map)
+    }
+
+    /// Texels of the map of moments: as many a side as the finer map has.
+    pub fn size(self, material: &Material) -> [u32; 2] {
+        let maps = [material.maps.normal.as_ref(), self.roughness(material)];
+        maps.into_iter().flatten().fold([1, 1], |[w, h], map| [w.max(map.size()[0]), h.max(map.size()[1])])
+    }
+}
+
+impl Parameter {
+    /// Of a model with one lobe.
+    pub fn of(model: &Model) -> Self {
+        if matches!(model, Model::BlinnPhong(_)) { Self::Exponent } else { Self::Alpha }
+    }
+}
+
+/// The lobe at each place of a material, at each scale.
+#[derive(Clone, Debug)]
+pub struct Moments {
+    filtered: Filtered<'static>,
+    base: Base,
+}
+
+impl Moments {
+    /// Those that `filter` reads of a valid material; `None` for filters that read no mips of normals, and for materials without
+    /// a map to filter.
+    pub fn of(material: &Material, filter: Filter) -> Option<Self> {
+        let (filter, base) = (filter.stored()?, Base::of(material)?);
+        let sharp = || {
+            let model = Model::Ggx(Ggx { alpha: LEAST_ALPHA, f0: DVec3::ONE, albedo: DVec3::ZERO });
+            Material::new(model, Maps { normal: material.maps.normal.clone(), ..Maps::default() })
+        };
+        let map = match base {
+            Base::Lobe { .. } => BrdfMap::of(material, base.size(material), Rule::Exact),
+            Base::Normals => BrdfMap::of(&sharp(), base.size(material), Rule::Exact),
+        };
+        Some(Self { filtered: Filtered::keeping(filter, map.ok()?, false), base })
+    }
+
+    /// What is stored, with its mips.
+    pub fn filtered(&self) -> &Filtered<'static> {
+        &self.filtered
+    }
+
+    /// The shading normal, and the model's own parameter unless its lobes stay as they are, at `place` on the maps and a level
+    /// of theirs.
+    pub(crate) fn at(&self, model: &Model, place: DVec2, lod: f64) -> (DVec3, Option<f64>) {
+        let Mixture::Vmf(lobes) = self.filtered.decode(&self.filtered.sample(place, lod)) else { return (DVec3::Z, None) };
+        let Some(lobe) = lobes.first() else { return (DVec3::Z, None) };
+        let own = match model {
+            Model::Ggx(_) => (2.0 / lobe.kappa).sqrt().clamp(LEAST_ALPHA, 1.0),
+            Model::BlinnPhong(_) => (1.0 / vmf::spread(lobe.kappa) - 2.0).clamp(0.0, MOST_CONCENTRATION),
+            _ => lobe.kappa.clamp(0.0, MOST_CONCENTRATION),
+        };
+        (lobe.mu, (self.base != Base::Normals).then_some(own))
+    }
+}
+
+/// About the most that normals add to the square of alpha under a filter that widens lobes: twice what all of the map's
+/// together add, as a part of them may spread more; at most 1.
+pub(crate) fn most_added(material: &Material, filter: Filter) -> f64 {
+    let widens = matches!(filter, Filter::Toksvig | Filter::Vmf1) && matches!(Base::of(material), Some(Base::Lobe { .. }));
+    let Some(map) = material.maps.normal.as_ref().filter(|_| widens) else { return 0.0 };
+    let (size, texels) = map.level(0);
+    let component = |bytes: &[u8]| half::f16::from_le_bytes([bytes[0], bytes[1]]).to_f64();
+    let normals = texels.as_chunks::<4>().0.iter().map(|t| {
+        let xy = DVec2::new(component(&t[..2]), component(&t[2..]));
+        xy.extend((1.0 - xy.length_squared()).max(0.0).sqrt()).normalize()
+    });
+    let mean = normals.sum::<DVec3>() / (f64::from(size[0]) * f64::from(size[1]));
+    // Alpha squared is twice the spread.
+    (4.0 * (1.0 - mean.length())).clamp(0.0, 1.0)
+}

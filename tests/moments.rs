@@ -1,0 +1,248 @@
+//! Filters that read normals and roughness through mips: what the passes store against the f64 twin, frames against quadrature, and
+//! what they are good for.
+#![cfg(feature = "offline")]
+
+mod support {
+    pub mod frames;
+}
+
+use glam::{DVec3, Mat4, Vec3};
+use passband::moments::Moments;
+use passband::offline::builtin;
+use passband::offline::headless::{Headless, Options};
+use passband::offline::reference::Options as Quadrature;
+use passband::offline::session::Session;
+use passband::offline::texture::{Encoding, Image, Part};
+use passband::offline::world::World;
+use passband::reflectance::{BlinnPhong, Lobe, Model, Vmf};
+use passband::{Config, Estimator, Filter, Light, Maps, Requirements, Roughness, Texture};
+use std::f32::consts::TAU;
+use std::sync::Arc;
+use support::frames::{Stage, config, expected_with, furthest, ggx, ratio, table, tiles, world};
+
+/// Those that store moments.
+const FILTERS: [Filter; 4] = [Filter::Naive, Filter::Fixed, Filter::Toksvig, Filter::Vmf1];
+
+fn texels<T>([w, h]: [u32; 2], f: impl Fn(f32, f32) -> T) -> Vec<T> {
+    (0..w * h).map(|i| f(((i % w) as f32 + 0.5) / w as f32, ((i / w) as f32 + 0.5) / h as f32)).collect()
+}
+
+/// Bumps that differ along u and v.
+fn normals(size: [u32; 2], height: f32) -> Option<Arc<Texture>> {
+    let texel = |u: f32, v: f32| {
+        Vec3::new(height * (TAU * 6.0 * u).sin() + 0.1, 0.7 * height * (TAU * (4.0 * v + u)).cos() - 0.15, 1.0).normalize()
+    };
+    Some(Arc::new(Texture::normals(size, &texels(size, |u, v| texel(u, v).to_array())).unwrap()))
+}
+
+fn roughness(size: [u32; 2], kind: Roughness, low: f32, high: f32) -> Option<(Arc<Texture>, Roughness)> {
+    let texel = |u: f32, v: f32| low * (high / low).powf(0.5 + 0.5 * (TAU * (3.0 * u + 2.0 * v)).sin());
+    Some((Arc::new(Texture::scalar(size, &texels(size, texel)).unwrap()), kind))
+}
+
+fn blinn_phong() -> Model {
+    Model::BlinnPhong(BlinnPhong { exponent: 90.0, specular: DVec3::new(0.5, 0.6, 0.7), albedo: DVec3::splat(0.3) })
+}
+
+fn lobes(all: &[(f64, f64)]) -> Model {
+    let lobe = |&(x, kappa)| Lobe { mu: DVec3::new(x, 0.0, 1.0), kappa, weight: 0.4 };
+    Model::Vmf(Arc::new(Vmf::new(&all.iter().map(lobe).collect::<Vec<_>>()).unwrap()))
+}
+
+/// Materials with maps of odd and of different sizes, few enough that none is resampled.
+fn materials() -> Vec<(&'static str, Model, Maps)> {
+    let odd = [67, 45];
+    let with = |normal, roughness| Maps { normal, roughness, ..Maps::default() };
+    vec![
+        ("ggx", ggx(0.3, DVec3::ONE, DVec3::ZERO), with(normals(odd, 0.5), None)),
+        (
+            "rough ggx",
+            ggx(0.3, DVec3::ONE, DVec3::ZERO),
+            with(normals(odd, 0.3), roughness([32, 64], Roughness::Alpha, 0.02, 0.6)),
+        ),
+        ("sharp ggx", ggx(0.3, DVec3::ONE, DVec3::ZERO), with(None, roughness(odd, Roughness::Kappa, 1e3, 6e4))),
+        ("blinn-phong", blinn_phong(), with(normals(odd, 0.5), None)),
+        ("rough blinn-phong", blinn_phong(), with(normals(odd, 0.2), roughness(odd, Roughness::Kappa, 10.0, 900.0))),
+        ("one lobe", lobes(&[(0.0, 50.0)]), with(normals(odd, 0.4), roughness(odd, Roughness::Alpha, 0.1, 0.8))),
+        ("two lobes", lobes(&[(0.7, 30.0), (-0.5, 60.0)]), with(normals(odd, 0.4), roughness(odd, Roughness::Alpha, 0.1, 0.8))),
+        ("table", table("metallic-paint"), with(normals([64, 33], 0.4), None)),
+        ("no map", blinn_phong(), Maps::default()),
+    ]
+}
+
+fn session(world: &World, config: &Config) -> Session {
+    let options = Options { device: Some("llvmpipe".into()), validate: true };
+    let headless = Headless::new(&options, &Requirements::of(config)).unwrap();
+    Session::new(headless, world, config).unwrap()
+}
+
+#[test]
+fn passes_store_what_the_twin_does() {
+    let mut scene = world("sphere", 16, blinn_phong(), builtin::environment("constant", 16).unwrap());
+    let first = scene.materials[0].clone();
+    let named = |(name, model, maps): (&str, Model, Maps)| {
+        let mut material = first.clone();
+        (material.name, material.model, material.maps) = (name.into(), model, maps);
+        material
+    };
+    scene.materials = materials().into_iter().map(named).collect();
+    for filter in FILTERS {
+        let mut session = session(&scene, &Config { filter, ..config([8, 8], Estimator::Mis, 2) });
+        let names: Vec<_> = session.setup().iter().map(|(name, _)| *name).collect();
+        assert!(names.contains(&"brdf_map") && names.contains(&"vmf_mips"), "{names:?}");
+        for (number, material) in scene.materials.iter().enumerate() {
+            let case = format!("{} {}", filter.name(), material.name);
+            let stored = session.moments(number).unwrap();
+            let Some(twin) = Moments::of(&material.surface(), filter) else {
+                assert!(stored.is_none() && material.maps.is_empty(), "{case}");
+                continue;
+            };
+            let (stored, twin) = (stored.unwrap(), twin.filtered());
+            let normals_only = ["two lobes", "table"].contains(&material.name.as_str());
+            assert_eq!(stored.len(), twin.levels(), "{case}");
+            let (mut worst, mut worst_w) = (0.0f64, 0.0f64);
+            for (level, (size, texels)) in stored.iter().enumerate() {
+                assert_eq!(*size, twin.size(level), "{case}");
+                for (i, texel) in texels.iter().enumerate() {
+                    let expected = twin.texel(level, i).unwrap();
+                    let [x, y, z, w] = texel.map(f64::from);
+                    let off = DVec3::new(x, y, 1.0 - z) - DVec3::new(expected[0], expected[1], expected[2]);
+                    worst = worst.max(off.length());
+                    let known = if filter == Filter::Vmf1 { 1.0 - expected[4] } else { expected[3] };
+                    worst_w = worst_w.max(if normals_only { 0.0 } else { (w / known - 1.0).abs() });
+                }
+            }
+            println!("{case}: vector {worst:.1e}, spread or concentration {worst_w:.1e}");
+            // Under sharp lobes, normals that spread by less than 2e-7 count as one.
+            assert!(worst < 2e-6 && worst_w < 1.5e-3, "{case}: {worst:e} {worst_w:e}");
+        }
+        assert_eq!(session.messages(), [""; 0]);
+    }
+}
+
+/// One mesh, mirrored and stretched, under a small sun.
+fn scene(mesh: &str, model: Model, maps: Maps) -> World {
+    let mut world = world(mesh, 128, model, builtin::environment("sun-sky", 128).unwrap());
+    let object = &mut world.objects[0];
+    Arc::make_mut(&mut object.mesh).compute_tangents();
+    object.transform = Mat4::from_rotation_y(0.8) * Mat4::from_scale(Vec3::new(-1.0, 0.9, 1.0));
+    world.materials[0].maps = maps;
+    world
+}
+
+#[test]
+fn frames_are_those_of_the_quadrature() {
+    let tiled = |normal, roughness| Maps { normal, roughness, tiling: [3.0, 2.0], ..Maps::default() };
+    let all = |low, high| roughness([67, 45], Roughness::Alpha, low, high);
+    let metal = || ggx(0.15, DVec3::splat(0.9), DVec3::splat(0.3));
+    let cases = [
+        ("ggx", Filter::Vmf1, scene("sphere", metal(), tiled(normals([67, 45], 0.3), all(0.1, 0.4)))),
+        ("ggx, no roughness", Filter::Toksvig, scene("torus-knot", metal(), tiled(normals([64; 2], 0.3), None))),
+        ("ggx, fixed", Filter::Fixed, scene("sphere", metal(), tiled(normals([67, 45], 0.3), all(0.1, 0.4)))),
+        ("blinn-phong", Filter::Vmf1, scene("sphere", blinn_phong(), tiled(normals([64; 2], 0.3), all(0.1, 0.4)))),
+        ("blinn-phong, naive", Filter::Naive, scene("sphere", blinn_phong(), tiled(normals([64; 2], 0.3), all(0.1, 0.4)))),
+        ("one lobe", Filter::Vmf1, scene("sphere", lobes(&[(0.0, 60.0)]), tiled(normals([64; 2], 0.3), all(0.1, 0.4)))),
+        ("two lobes", Filter::Vmf1, scene("sphere", lobes(&[(0.6, 60.0), (-0.4, 30.0)]), tiled(normals([64; 2], 0.3), None))),
+        ("table", Filter::Vmf1, scene("sphere", table("metallic-paint"), tiled(normals([64; 2], 0.3), None))),
+    ];
+    for (name, filter, world) in cases {
+        let expected = expected_with(&world, [64, 64], Quadrature { filter, ..Quadrature::default() }, |interior| {
+            interior.into_iter().filter(|i| (i % 64 + i / 64) % 2 == 0).collect()
+        });
+        let config = Config { filter, ..config(expected.extent, Estimator::Mis, 4096) };
+        let image = Stage::new(&world, &config).frame([0, 0]);
+        let radiance = |i: usize| image.radiance(i);
+        let mean = ratio(&expected.pixels, radiance);
+        let tiles = tiles(&expected, 24, radiance);
+        let tile = furthest(tiles.iter().copied());
+        println!("{name:20} mean {mean:.5}, worst of {} tiles {tile:.5}, {} pixels", tiles.len(), expected.pixels.len());
+        assert!(expected.error <= 1e-3 && expected.pixels.len() > 400 && tiles.len() >= 6);
+        assert!((mean - 1.0).abs() <= 0.003 && (tile - 1.0).abs() <= 0.01, "{name}: mean {mean:.5}, tile {tile:.5}");
+    }
+}
+
+#[test]
+fn constant_maps_change_nothing() {
+    let tilted = |size| {
+        let normal = Vec3::new(0.3, -0.2, 0.9).normalize().to_array();
+        Some(Arc::new(Texture::normals(size, &texels(size, |_, _| normal)).unwrap()))
+    };
+    let even = |size, value| Some((Arc::new(Texture::scalar(size, &texels(size, |_, _| value)).unwrap()), Roughness::Alpha));
+    let cases = [
+        ("ggx", ggx(0.2, DVec3::ONE, DVec3::ZERO), tilted([67, 45]), None),
+        // A concentration of 80 000.
+        ("sharp ggx", ggx(0.2, DVec3::ONE, DVec3::ZERO), tilted([67, 45]), even([67, 45], 0.005)),
+        ("blinn-phong", blinn_phong(), tilted([16; 2]), even([8; 2], 0.1)),
+        ("one lobe", lobes(&[(0.0, 40.0)]), tilted([33, 64]), None),
+        ("two lobes", lobes(&[(0.5, 40.0), (0.0, 9.0)]), tilted([33, 64]), even([8; 2], 0.3)),
+        ("table", table("metallic-paint"), tilted([33, 64]), None),
+    ];
+    for (name, model, normal, roughness) in cases {
+        let mut scene = scene("sphere", model, Maps { normal, roughness, tiling: [9.0, 9.0], ..Maps::default() });
+        // Exact, without noise.
+        scene.environment = None;
+        scene.lights = vec![Light::Directional { direction: [-0.4, -0.6, -0.7], irradiance: [1.0; 3] }];
+        let frame = |filter| Stage::new(&scene, &Config { filter, ..config([48, 48], Estimator::Mis, 2) }).frame([0, 0]);
+        let point = frame(Filter::Point);
+        let total: DVec3 = (0..48 * 48).map(|i| point.radiance(i)).sum();
+        for filter in FILTERS {
+            let image = frame(filter);
+            let off: DVec3 = (0..48 * 48).map(|i| (image.radiance(i) - point.radiance(i)).abs()).sum();
+            let off = (off / total).max_element();
+            println!("{name} {}: {off:.1e}", filter.name());
+            // The roughness is stored in 16 bits, of which one is 5e-4.
+            assert!(off < 4e-3, "{name} {}: {off:e}", filter.name());
+        }
+    }
+}
+
+/// The built-in map `name` on a tilted plane under a light, minified.
+fn plane(name: &str, light: Light) -> World {
+    let normal = Image::builtin(name, Part::Normal).unwrap().normals(Encoding::Signed, true, 1.0).unwrap();
+    let kappa = Image::builtin(name, Part::Concentration).unwrap().roughness().unwrap();
+    let mut world = world("plane", 16, ggx(0.3, DVec3::splat(0.9), DVec3::ZERO), builtin::environment("constant", 16).unwrap());
+    Arc::make_mut(&mut world.objects[0].mesh).compute_tangents();
+    world.objects[0].transform = Mat4::from_rotation_x(0.9);
+    world.materials[0].maps =
+        Maps { normal: Some(Arc::new(normal)), roughness: Some((Arc::new(kappa), Roughness::Kappa)), ..Maps::default() };
+    world.environment = None;
+    world.lights = vec![light];
+    world
+}
+
+#[test]
+fn errors_fall_in_the_order_of_the_study() {
+    const SIDE: usize = 48;
+    const FINER: usize = 16;
+    let sun = Light::Directional { direction: [-0.2, -0.5, -0.8], irradiance: [1.0; 3] };
+    let lamp = Light::Point { position: [0.5, 1.0, 1.2], intensity: [1.0; 3] };
+    for (name, light) in [("bumps", sun), ("dunes", lamp)] {
+        let scene = plane(name, light);
+        let frame = |side: usize, filter| {
+            let config = Config { filter, ..config([side as u32; 2], Estimator::Mis, 2) };
+            Stage::new(&scene, &config).frame([0, 0])
+        };
+        let fine = frame(SIDE * FINER, Filter::Point);
+        let below = |i: usize| {
+            let (x, y) = (i % SIDE * FINER, i / SIDE * FINER);
+            (0..FINER * FINER).map(move |k| (y + k / FINER) * SIDE * FINER + x + k % FINER)
+        };
+        let inside: Vec<_> = (0..SIDE * SIDE).filter(|i| below(*i).all(|k| fine.coverage(k) == 1.0)).collect();
+        assert!(inside.len() > 400, "{}", inside.len());
+        let truth: Vec<_> =
+            inside.iter().map(|i| below(*i).map(|k| fine.radiance(k)).sum::<DVec3>() / (FINER * FINER) as f64).collect();
+        let squared: f64 = truth.iter().map(|t| t.length_squared()).sum();
+        let error = |filter| {
+            let image = frame(SIDE, filter);
+            let off: f64 = inside.iter().zip(&truth).map(|(i, t)| (image.radiance(*i) - t).length_squared()).sum();
+            (off / squared).sqrt()
+        };
+        let [point, naive, fixed, toksvig, vmf1] =
+            [Filter::Point, Filter::Naive, Filter::Fixed, Filter::Toksvig, Filter::Vmf1].map(error);
+        println!("{name}: point {point:.3}, naive {naive:.3}, fixed {fixed:.3}, toksvig {toksvig:.3}, vmf1 {vmf1:.3}");
+        assert!((vmf1 / toksvig - 1.0).abs() < 0.3, "{name}: toksvig {toksvig:.3}, vmf1 {vmf1:.3}");
+        for worse in [point, naive, fixed] {
+            assert!(vmf1.max(toksvig) < 0.6 * worse, "{name}: {vmf1:.3} and {toksvig:.3} for {worse:.3}");
+        }
+    }
+}
