@@ -123,3 +123,66 @@ pub(crate) fn most_added(material: &Material, filter: Filter) -> f64 {
     // Alpha squared is twice the spread.
     (4.0 * (1.0 - mean.length())).clamp(0.0, 1.0)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::material::Roughness;
+    use crate::reflectance::{BlinnPhong, MerlTable, Vmf};
+
+    fn tilted(x: f32) -> [f32; 3] {
+        [x, 0.0, (1.0 - x * x).sqrt()]
+    }
+
+    fn maps(normals: [f32; 2]) -> Maps {
+        let normal = Texture::normals([2, 1], &normals.map(tilted)).unwrap();
+        Maps { normal: Some(Arc::new(normal)), ..Maps::default() }
+    }
+
+    #[test]
+    fn normals_widen_a_lobe_by_their_spread() {
+        let blinn_phong = Model::BlinnPhong(BlinnPhong { exponent: 98.0, specular: DVec3::ONE, albedo: DVec3::ZERO });
+        let ggx = Model::Ggx(Ggx { alpha: 0.1, f0: DVec3::ONE, albedo: DVec3::ZERO });
+        let one = Model::Vmf(Arc::new(Vmf::new(&[vmf::Lobe { mu: DVec3::Z, kappa: 200.0, weight: 1.0 }]).unwrap()));
+        for (model, own, spread) in [(blinn_phong, 98.0, 0.01), (ggx, 0.1, vmf::spread(200.0)), (one, 200.0, vmf::spread(200.0))]
+        {
+            let material = Material::new(model.clone(), maps([0.3, -0.3]));
+            let moments = Moments::of(&material, Filter::Vmf1).unwrap();
+            let near = material.filtered_at(Some(&moments), DVec2::new(0.25, 0.5), [DVec2::ZERO; 2]);
+            // Normals are stored in 16 bits.
+            assert!((near.normal.x - 0.3).abs() < 1e-3 && (near.roughness.unwrap() / own - 1.0).abs() < 1e-5, "{near:?}");
+            let far = material.filtered_at(Some(&moments), DVec2::new(0.25, 0.5), [DVec2::X, DVec2::Y]);
+            let length = (1.0 - spread) * (1.0f64 - 0.09).sqrt();
+            let (kappa, parameter) = (vmf::concentration(1.0 - length), far.roughness.unwrap());
+            let expected = match &model {
+                Model::Ggx(_) => (2.0 / kappa).sqrt(),
+                Model::BlinnPhong(_) => 1.0 / (1.0 - length) - 2.0,
+                _ => kappa,
+            };
+            assert!((parameter / expected - 1.0).abs() < 2e-3 && far.normal.z > 0.999_999, "{parameter} for {expected}");
+            // Both normals together add 0.093 to alpha squared.
+            assert!((most_added(&material, Filter::Vmf1) - 4.0 * (1.0 - 0.91f64.sqrt())).abs() < 1e-3);
+            assert_eq!(most_added(&material, Filter::Naive), 0.0);
+            assert!(most_added(&Material::new(model, maps([0.3, 0.3])), Filter::Toksvig) < 1e-5);
+        }
+    }
+
+    #[test]
+    fn tables_and_mixtures_keep_their_lobes() {
+        let lobe = |x: f64| vmf::Lobe { mu: DVec3::new(x, 0.0, 1.0).normalize(), kappa: 40.0, weight: 0.5 };
+        let mixture = Model::Vmf(Arc::new(Vmf::new(&[lobe(0.4), lobe(-0.4)]).unwrap()));
+        let off = Model::Vmf(Arc::new(Vmf::new(&[lobe(0.4)]).unwrap()));
+        let table = Model::Table(Arc::new(MerlTable::from_fn(|_, _, _| DVec3::ONE)));
+        for model in [mixture, off, table] {
+            let material = Material::new(model.clone(), maps([0.5, -0.3]));
+            let moments = Moments::of(&material, Filter::Vmf1).unwrap();
+            let far = material.filtered_at(Some(&moments), DVec2::ZERO, [DVec2::X, DVec2::Y]);
+            let mean = DVec2::new(0.2, 0.75f64.sqrt() + 0.91f64.sqrt()).normalize();
+            assert!((far.normal.x - mean.x).abs() < 1e-3 && far.roughness.is_none(), "{far:?}");
+            let rough = Texture::scalar([1, 1], &[0.5]).unwrap();
+            let rough = Maps { roughness: Some((Arc::new(rough), Roughness::Alpha)), ..Maps::default() };
+            assert!(Moments::of(&Material::new(model, rough), Filter::Vmf1).is_none());
+            assert!(Moments::of(&material, Filter::Tk).is_none());
+        }
+    }
+}

@@ -8,11 +8,17 @@ use common::rig::{Rig, grey, sky};
 use passband::offline::builtin;
 use passband::reflectance::Model;
 use passband::reflectance::stand_in;
-use passband::{Config, Error, Rate, Renderer, memory_footprint};
+use passband::{Config, Error, Filter, Maps, Material, Rate, Renderer, Texture, memory_footprint};
 use std::sync::Arc;
 
 fn config() -> Config {
-    Config { curvature: true, rate: Rate::Uniform(2), directions: 4, ..Config::new([24, 16]) }
+    Config { curvature: true, rate: Rate::Uniform(2), directions: 4, filter: Filter::Vmf1, ..Config::new([24, 16]) }
+}
+
+/// With a map that the filter makes moments of.
+fn bumpy() -> Material {
+    let normals = Texture::normals([2, 1], &[[0.6, 0.0, 0.8], [-0.6, 0.0, 0.8]]).unwrap();
+    Material::new(grey(), Maps { normal: Some(Arc::new(normals)), ..Maps::default() })
 }
 
 /// Runs `call` with request 0, 1, … failing until it succeeds; the number of requests that it makes.
@@ -52,12 +58,12 @@ fn whichever_request_fails_nothing_is_kept() {
         rig.try_submit(|cmd, _, memory| unsafe { renderer.record_environment(cmd, &sky(), memory) })
     });
     assert_eq!(requests, 4, "two images, two staging buffers");
-    let models = [grey().into(), table.into()];
+    let models = [bumpy(), table.into()];
     let ((), requests) = until_it_succeeds(&mut rig, |rig| {
         // SAFETY: the command buffer is recording.
         rig.try_submit(|cmd, _, memory| unsafe { renderer.record_materials(cmd, &models, memory) })
     });
-    assert_eq!(requests, 12, "four images and two buffers, each with staging");
+    assert_eq!(requests, 13, "four images and two buffers, each with staging, and the moments");
 
     let draws = [rig.draw(&builtin::mesh("sphere", 16).unwrap(), 0)];
     let image = rig.frame(&mut renderer, &draws);
@@ -120,7 +126,7 @@ fn a_whole_life_gives_everything_back() {
             // SAFETY: the command buffer is recording.
             let mut bag = unsafe { renderer.record_environment(cmd, &sky(), memory) }.unwrap();
             // SAFETY: as above.
-            bag.append(unsafe { renderer.record_materials(cmd, &[grey().into(), grey().into()], memory) }.unwrap());
+            bag.append(unsafe { renderer.record_materials(cmd, &[grey().into(), bumpy()], memory) }.unwrap());
             ((), bag)
         });
         rig.frame(&mut renderer, &draws);
