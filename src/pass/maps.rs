@@ -41,6 +41,7 @@ pub(crate) struct MapImages {
     /// Textures, and behind them moments.
     classes: Vec<Image>,
     /// Class and layer of each material's moments.
+    #[cfg_attr(not(feature = "offline"), expect(dead_code, reason = "only `offline` reads them back"))]
     moments: Vec<Option<Place>>,
 }
 
