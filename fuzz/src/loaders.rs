@@ -27,8 +27,6 @@ pub struct Loader {
 
 /// What a number of text costs as a vertex with all its attributes, while it is parsed.
 const MESH: usize = 1 << 10;
-/// Deflate's best ratio, times what a sample becomes on its way to floats.
-const IMAGE: usize = 1032 * 16;
 /// A bit of a PNG as a texel of three bytes, and beside it a float of each channel and the finished texture with its mips.
 const TEXTURE: usize = 1032 * 8 * 24;
 /// The most that gzip may unpack to, as a mesh.
