@@ -29,7 +29,8 @@ pub enum Estimator {
 
 /// Where samples are shaded. Levels are of output pixels: 0 is a pixel, +1 is 2x2 coarser; the samples of a pixel are at
 /// negative ones. Every sample that is not shaded is up-sampled from coarser cells. A host with its own bridge replaces the
-/// modules `pyramid.comp` and `classify.levels.comp` too, unless the rate is full.
+/// modules `pyramid.comp` and `classify.levels.comp` too, unless the rate is full, and for [`Rate::Bandwidth`] also
+/// `bandwidth.blocks.comp` and `bandwidth.comp`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Rate {
     /// Every sample.

@@ -7,7 +7,6 @@ use crate::gpu::context::Context;
 use crate::gpu::image::Image;
 use crate::gpu::pipeline::BridgeSets;
 use crate::gpu::recorder::Recorder;
-use crate::gpu::timer::FrameTimings;
 use crate::renderer::Renderer;
 use ash::vk;
 
@@ -51,11 +50,6 @@ impl Renderer {
     /// Forgets a buffer that is about to be destroyed.
     pub(crate) fn forget(&mut self, buffer: &Buffer) {
         self.states.forget(buffer.handle);
-    }
-
-    /// GPU times of the passes of the last [`Self::record_materials`], which has run.
-    pub(crate) fn set_up_times(&self) -> Result<FrameTimings> {
-        Ok(self.set_up.results(&self.cx, 0)?.unwrap_or_default())
     }
 
     /// The array of a material's moments and its layer there.

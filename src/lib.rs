@@ -19,6 +19,7 @@ mod plan;
 pub mod reflectance;
 mod renderer;
 pub mod sampling;
+mod set_up;
 mod targets;
 pub mod texture;
 mod view;
@@ -29,8 +30,8 @@ pub use error::{Error, Result};
 pub use frame::{EnvironmentUse, FrameInputs, GBufferInput, Output};
 pub use glam;
 pub use gpu::{
-    Access, AllocationError, Block, DedicatedAllocator, Host, HostAllocator, ImageRef, Location, MemoryRequest, Missing,
-    Requirements, Retired,
+    Access, AllocationError, Block, DedicatedAllocator, FrameTimings, Host, HostAllocator, ImageRef, Location, MemoryRequest,
+    Missing, Requirements, Retired,
 };
 pub use light::Light;
 pub use material::{Maps, Material, PointMaterial, Roughness};

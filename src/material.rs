@@ -198,7 +198,7 @@ fn lod(footprint: [DVec2; 2], size: [u32; 2]) -> f64 {
 }
 
 /// The unit vector over x and y that faces up.
-fn unit(xy: DVec2) -> DVec3 {
+pub(crate) fn unit(xy: DVec2) -> DVec3 {
     xy.extend((1.0 - xy.length_squared()).max(0.0).sqrt()).normalize()
 }
 

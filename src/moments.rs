@@ -4,7 +4,7 @@
 use crate::config::Filter;
 use crate::distribution::effective::Rule;
 use crate::distribution::{BrdfMap, Filtered, Mixture, vmf};
-use crate::material::{LEAST_ALPHA, MOST_CONCENTRATION, Maps, Material};
+use crate::material::{LEAST_ALPHA, MOST_CONCENTRATION, Maps, Material, unit};
 use crate::reflectance::{Ggx, Model};
 use crate::texture::Texture;
 use glam::{DVec2, DVec3};
@@ -113,13 +113,8 @@ impl Moments {
 pub(crate) fn most_added(material: &Material, filter: Filter) -> f64 {
     let widens = matches!(filter, Filter::Toksvig | Filter::Vmf1) && matches!(Base::of(material), Some(Base::Lobe { .. }));
     let Some(map) = material.maps.normal.as_ref().filter(|_| widens) else { return 0.0 };
-    let (size, texels) = map.level(0);
-    let component = |bytes: &[u8]| half::f16::from_le_bytes([bytes[0], bytes[1]]).to_f64();
-    let normals = texels.as_chunks::<4>().0.iter().map(|t| {
-        let xy = DVec2::new(component(&t[..2]), component(&t[2..]));
-        xy.extend((1.0 - xy.length_squared()).max(0.0).sqrt()).normalize()
-    });
-    let mean = normals.sum::<DVec3>() / (f64::from(size[0]) * f64::from(size[1]));
+    let sum: DVec3 = map.texels().map(|texel| unit(texel.truncate().truncate())).sum();
+    let mean = sum / map.texels().count().max(1) as f64;
     // Alpha squared is twice the spread.
     (4.0 * (1.0 - mean.length())).clamp(0.0, 1.0)
 }

@@ -1,6 +1,6 @@
-//! The frame, readable top to bottom: which pass, in which order, on which images.
+//! The frame, readable top to bottom: which pass, in which order, on which images. What comes before it is in `set_up.rs`.
 
-use crate::config::{Config, Estimator, Rate};
+use crate::config::Config;
 use crate::error::{Error, Result};
 use crate::frame::{FrameInputs, GBufferInput, Output};
 use crate::frequency::allocation::DARK;
@@ -8,24 +8,21 @@ use crate::gpu::access::Access;
 use crate::gpu::buffer::Buffer;
 use crate::gpu::context::{Context, Host};
 use crate::gpu::memory::{HostAllocator, Location};
-use crate::gpu::pipeline::{BridgeLayouts, BridgeSets};
+use crate::gpu::pipeline::BridgeSets;
 use crate::gpu::recorder::{Recorder, States};
 use crate::gpu::retire::{Build, Retired};
 use crate::gpu::sampler::Samplers;
 use crate::gpu::timer::{FrameTimings, GpuTimer};
 use crate::light;
-use crate::material::Material;
-use crate::pass::environment::{Analyses, EnvironmentImages, EnvironmentUpload};
+use crate::pass::environment::EnvironmentImages;
 use crate::pass::gbuffer;
-use crate::pass::maps::Reading;
-use crate::pass::materials::{MaterialBridge, MaterialImages, MaterialsUpload};
+use crate::pass::materials::{MaterialBridge, MaterialImages};
 use crate::pass::{
-    FrameUniform, PassContext, allocate, bandwidth, base, brdf_map, classify, curvature, filter, level, luminance, pyramid,
-    resolve, shade, tonemap, upsample, vmf_mips,
+    FrameUniform, allocate, bandwidth, base, classify, curvature, filter, level, luminance, pyramid, resolve, shade, tonemap,
+    upsample,
 };
-use crate::passes::{Passes, Sampled, layout};
+use crate::passes::{Passes, Sampled};
 use crate::plan::{Directions, LIGHT_BYTES};
-use crate::sampling::LatLong;
 use crate::targets::Targets;
 use ash::vk;
 
@@ -44,7 +41,7 @@ pub struct Renderer {
     pub(crate) config: Config,
     pub(crate) states: States,
     timer: GpuTimer,
-    /// Of the passes that materials' maps go through.
+    /// Of [`Self::record_materials`].
     pub(crate) set_up: GpuTimer,
     timings: Option<FrameTimings>,
     pass_bytes: Vec<(&'static str, u64)>,
@@ -52,7 +49,7 @@ pub struct Renderer {
     pub(crate) bridge: MaterialBridge,
     pub(crate) uniforms: Vec<Buffer>,
     lights: Vec<Buffer>,
-    passes: Passes,
+    pub(crate) passes: Passes,
     pub(crate) targets: Targets,
     /// Whether `targets` hold a frame.
     shown: bool,
@@ -112,79 +109,6 @@ impl Renderer {
         })
     }
 
-    /// Replaces the environment: creates its images and records their upload. The bag holds the staging memory and the
-    /// former environment.
-    ///
-    /// # Errors
-    /// As [`Self::new`]; the former environment stays then.
-    ///
-    /// # Safety
-    /// `cmd` is recording outside a render pass, and is submitted before any frame recorded afterwards.
-    pub unsafe fn record_environment(
-        &mut self,
-        cmd: vk::CommandBuffer,
-        map: &LatLong,
-        memory: &mut dyn HostAllocator,
-    ) -> Result<Retired> {
-        let passes =
-            Analyses { bandwidth: self.passes.environment_bandwidth.as_ref(), prefilter: self.passes.prefilter.as_ref() };
-        let upload = Build::run(&self.cx, memory, |build| EnvironmentUpload::new(build, map, passes, &self.samplers))?;
-        let mut bag = Retired::default();
-        let mut rec = Recorder::new(&self.cx, cmd, 0, &mut self.states, None);
-        let fresh = upload.record(&mut rec, passes, &mut bag);
-        if let Some(former) = self.environment.replace(fresh) {
-            former.retire(&mut self.states, &mut bag);
-        }
-        Ok(bag)
-    }
-
-    /// Replaces the materials: builds their importance tables, compiles the pass that reads their maps and records the uploads.
-    /// Draws and G-buffers name them by index. The bag holds the staging memory and the former materials.
-    ///
-    /// # Errors
-    /// As [`Self::new`]; the former materials stay then.
-    ///
-    /// # Safety
-    /// As [`Self::record_environment`].
-    pub unsafe fn record_materials(
-        &mut self,
-        cmd: vk::CommandBuffer,
-        materials: &[Material],
-        memory: &mut dyn HostAllocator,
-    ) -> Result<Retired> {
-        let bridge = BridgeLayouts { gbuffer: layout(&self.passes.gbuffer, &self.config), materials: self.bridge.layout };
-        let (modules, slots, widened) = (&self.config.modules, self.config.frames_in_flight, self.config.widened());
-        let (filter, passes, samplers) = (self.config.filter, self.passes.moments.as_ref(), &self.samplers);
-        let eps = (self.config.rate == Rate::Bandwidth).then_some(self.config.eps);
-        if self.config.estimator == Estimator::Preconvolved {
-            base::check_materials(materials)?;
-        }
-        let (mut upload, filter) = Build::run(&self.cx, memory, |build| {
-            let upload = MaterialsUpload::new(build, materials, &Reading { filter, widened, passes, samplers }, eps)?;
-            let mut p = PassContext { build, modules, bridge, slots };
-            let filter = filter::Filter::new(&mut p, filter, upload.uses(), widened)?;
-            Ok((upload, filter))
-        })?;
-        let mut bag = Retired::default();
-        self.set_up.restart(&self.cx, cmd, 0);
-        let mut rec = Recorder::new(&self.cx, cmd, 0, &mut self.states, Some(&mut self.set_up));
-        rec.begin(crate::pass::materials::NAME);
-        let work = upload.work();
-        let fresh = upload.record(&mut rec, &mut bag);
-        rec.end();
-        if let (Some((map, mips)), Some((of_map, of_mips))) = (&self.passes.moments, work) {
-            map.record(&mut rec, &brdf_map::Io { maps: &fresh.maps }, &of_map);
-            mips.record(&mut rec, &vmf_mips::Io { maps: &fresh.maps }, &of_map, &of_mips);
-            of_map.retire(&mut bag);
-            of_mips.retire(&mut bag);
-        }
-        if let Some((former, pass)) = self.materials.replace((fresh, filter)) {
-            former.retire(&mut self.states, &mut bag);
-            pass.retire(&mut bag);
-        }
-        Ok(bag)
-    }
-
     /// Records one frame.
     ///
     /// # Errors
@@ -241,13 +165,10 @@ impl Renderer {
         // 4  The level of every sample: predicted, by the frame before, the same, or the host's.
         let shading = targets.plan.shading;
         let analysed = environment.bandwidth.as_ref().zip(materials.bandwidths.as_ref());
-        let lists = targets.forecast.as_ref().zip(targets.predicted.as_ref());
-        let predict = passes.bandwidth.as_ref().zip(analysed).zip(targets.prediction.as_ref()).zip(lists);
+        let predict = passes.bandwidth.as_ref().zip(analysed).zip(targets.prediction.as_ref());
         let mut forecast = None;
         let level = match (&targets.level, &inputs.levels) {
-            (Some(level), _)
-                if let Some((((pass, (environment_bandwidth, material_bandwidths)), prediction), (groups, blocks))) = predict =>
-            {
+            (Some(level), _) if let Some(((pass, (environment_bandwidth, material_bandwidths)), prediction)) = predict => {
                 pass.record(
                     rec,
                     &bandwidth::Io {
@@ -265,11 +186,9 @@ impl Renderer {
                         dark: (DARK * environment.mean * f64::from(inputs.environment.intensity)) as f32,
                         level,
                         prediction,
-                        forecast: groups,
-                        blocks,
                     },
                 );
-                forecast = Some(groups);
+                forecast = Some(&prediction.forecast);
                 rec.image(level, Access::COMPUTE_SAMPLED);
                 Some(level.view)
             }
@@ -318,6 +237,7 @@ impl Renderer {
             let directions = Directions::of(&self.config, inputs.environment.intensity > 0.0, area);
             let mut to_shade = list;
             if let (Some(pass), Some(buffers), Some(prediction)) = (allocate, &targets.allocation, &targets.prediction) {
+                let prediction = &prediction.image;
                 let sources = area + u32::from(directions.environment > 0);
                 pass.record(rec, &allocate::Io { samplers, prediction, arguments, list, sources, buffers });
                 to_shade = &buffers.list;

@@ -8,7 +8,7 @@ use crate::gpu::memory::Location;
 use crate::gpu::recorder::States;
 use crate::gpu::retire::{Build, Retired};
 use crate::pass::allocate::AllocationBuffers;
-use crate::pass::bandwidth::{self, FORECAST_BYTES};
+use crate::pass::bandwidth::Prediction;
 use crate::pass::gbuffer::GBufferImages;
 use crate::pass::pyramid::Cells;
 use crate::plan::{ARGUMENT_BYTES, Plan};
@@ -22,12 +22,7 @@ pub(crate) struct Targets {
     pub curvature: Option<Image>,
     /// The level of each sample, where the renderer itself writes it.
     pub level: Option<Image>,
-    /// What the `bandwidth` pass finds in each block of samples.
-    pub prediction: Option<Image>,
-    /// What the `bandwidth` pass decides on the next passes.
-    pub forecast: Option<Buffer>,
-    /// The blocks of samples that it predicts.
-    pub predicted: Option<Buffer>,
+    pub prediction: Option<Prediction>,
     /// The frame before's tiles and mean luminance, where they decide.
     pub luminance: Option<[Buffer; 2]>,
     pub cells: Option<CellBuffers>,
@@ -87,16 +82,7 @@ impl Targets {
             factors: Image::new(build, plan.factors)?,
             curvature: plan.curvature.map(|desc| Image::new(build, desc)).transpose()?,
             level: plan.level.map(|desc| Image::new(build, desc)).transpose()?,
-            prediction: plan.prediction.map(|desc| Image::new(build, desc)).transpose()?,
-            forecast: plan
-                .prediction
-                .map(|_| Buffer::new(build, "forecast", FORECAST_BYTES, arguments, Location::Device))
-                .transpose()?,
-            predicted: plan
-                .prediction
-                .map(|desc| bandwidth::list_bytes([desc.extent[0], desc.extent[1]]))
-                .map(|bytes| Buffer::new(build, "predicted", bytes, storage | source, Location::Device))
-                .transpose()?,
+            prediction: plan.prediction.map(|desc| Prediction::new(build, desc)).transpose()?,
             luminance: plan
                 .luminance_buffers(config)
                 .map(|[tiles, mean]| {
@@ -119,7 +105,8 @@ impl Targets {
     #[cfg(feature = "offline")]
     pub fn image(&self, name: &str) -> Option<&Image> {
         let gbuffer = self.gbuffer.as_ref().map(GBufferImages::colors);
-        let own = [&self.curvature, &self.level, &self.prediction, &self.odd].into_iter().flatten();
+        let prediction = self.prediction.as_ref().map(|p| &p.image);
+        let own = [&self.curvature, &self.level, &self.odd].into_iter().flatten().chain(prediction);
         let always = [&self.normals, &self.factors, &self.radiance, &self.resolved];
         let all = gbuffer.into_iter().flatten().chain(own).chain(always);
         all.into_iter().find(|image| image.desc.name == name)
@@ -132,7 +119,7 @@ impl Targets {
         match name {
             "arguments" => Some(&self.arguments),
             "list" => Some(&self.list),
-            "forecast" => self.forecast.as_ref(),
+            "forecast" => self.prediction.as_ref().map(|p| &p.forecast),
             "cells" => cells.map(|c| &c.cells),
             "blocks" => cells.map(|c| &c.blocks),
             "weights" => cells.map(|c| &c.weights),
@@ -143,15 +130,16 @@ impl Targets {
 
     pub fn retire(self, states: &mut States, bag: &mut Retired) {
         let images = self.gbuffer.into_iter().flat_map(GBufferImages::into_images);
-        let own = [self.curvature, self.level, self.prediction, self.odd].into_iter().flatten();
+        let (prediction, predicted) = self.prediction.map(|p| (p.image, vec![p.forecast, p.blocks])).unzip();
+        let own = [self.curvature, self.level, prediction, self.odd].into_iter().flatten();
         for image in images.chain(own).chain([self.normals, self.factors, self.radiance, self.resolved]) {
             states.forget(image.handle);
             image.retire(bag);
         }
         let cells = self.cells.map(|c| vec![c.cells, c.blocks, c.weights, c.arguments]);
-        let groups = [cells, self.luminance.map(Vec::from), self.allocation.map(|a| a.into_buffers().into_iter().collect())];
-        let lists = [self.forecast, self.predicted].into_iter().flatten().chain([self.arguments, self.list]);
-        for buffer in groups.into_iter().flatten().flatten().chain(lists) {
+        let allocation = self.allocation.map(|a| Vec::from(a.into_buffers()));
+        let optional = [cells, predicted, self.luminance.map(Vec::from), allocation].into_iter().flatten().flatten();
+        for buffer in optional.chain([self.arguments, self.list]) {
             states.forget(buffer.handle);
             buffer.retire(bag);
         }

@@ -3,15 +3,16 @@
 //!
 //! `cargo test --test performance -- --ignored --nocapture --test-threads 1`
 
+use passband::offline::bench::runner::interleave;
 use passband::offline::headless::{Headless, Options};
 use passband::offline::scene::Scene;
 use passband::offline::session::Session;
 use passband::offline::stats::Quantiles;
 use passband::offline::world::World;
-use passband::{Config, Estimator, Rate, Renderer, Requirements};
+use passband::{Config, Estimator, FrameTimings, Rate, Renderer, Requirements};
 use std::time::Instant;
 
-const ROUNDS: usize = 9;
+const ROUNDS: u32 = 9;
 
 fn world() -> World {
     let scene = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/bunny-city.toml");
@@ -31,25 +32,14 @@ fn covered(session: &mut Session) -> u32 {
 }
 
 /// Milliseconds of the shade pass.
-fn shade(session: &Session) -> f64 {
-    session.timings().and_then(|t| t.passes.iter().find(|p| p.0 == "shade").map(|p| p.1)).unwrap()
+fn shade(times: &FrameTimings) -> f64 {
+    times.passes.iter().find(|p| p.0 == "shade").map(|p| p.1).unwrap()
 }
 
-/// What `time` says of frames that alternate between the sessions (A B B A …), after two warm-up frames each.
-fn interleaved(sessions: &mut [Session], time: impl Fn(&Session) -> f64) -> Vec<Vec<f64>> {
-    let mut times = vec![Vec::new(); sessions.len()];
-    for round in 0..ROUNDS + 2 {
-        let count = sessions.len();
-        for i in 0..count {
-            let i = if round % 2 == 0 { i } else { count - 1 - i };
-            // A frame's times arrive when the next one is recorded, before it runs.
-            sessions[i].frame([0, round as u32]).unwrap();
-            if round >= 2 {
-                times[i].push(time(&sessions[i]));
-            }
-        }
-    }
-    times
+/// What `time` says of frames that alternate between the sessions.
+fn interleaved(sessions: &mut [Session], time: impl Fn(&FrameTimings) -> f64) -> Vec<Vec<f64>> {
+    let times = interleave(sessions, ROUNDS, &mut |_, _| ()).unwrap();
+    times.iter().map(|times| times.iter().map(&time).collect()).collect()
 }
 
 #[test]
@@ -118,8 +108,7 @@ fn sixty_four_materials_against_one() {
         world
     });
     let mut sessions: Vec<_> = std::iter::once(&crowd).chain(&alone).map(|w| session(w, Estimator::Mis, 64, 512)).collect();
-    let frame = |s: &Session| s.timings().map(|t| t.span_ms).unwrap();
-    let times: Vec<_> = interleaved(&mut sessions, frame).into_iter().map(|t| Quantiles::of(t).median).collect();
+    let times: Vec<_> = interleaved(&mut sessions, |t| t.span_ms).into_iter().map(|t| Quantiles::of(t).median).collect();
     println!("64 materials: {:.1} ms; one table, GGX, Blinn-Phong, vMF: {:.1?} ms", times[0], &times[1..]);
     // The crowd has 9, 24, 16 and 15 of them.
     let mean = times[1..].iter().zip([9.0, 24.0, 16.0, 15.0]).map(|(t, n)| t * n / 64.0).sum::<f64>();

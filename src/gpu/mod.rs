@@ -25,3 +25,4 @@ pub use image::Image;
 pub use memory::{AllocationError, Block, DedicatedAllocator, HostAllocator, Location, MemoryRequest};
 pub use requirements::{Missing, Requirements};
 pub use retire::Retired;
+pub use timer::FrameTimings;

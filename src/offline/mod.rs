@@ -15,6 +15,7 @@ mod input;
 pub mod levels;
 pub mod lobe_cache;
 pub mod mesh;
+mod mesh_buffers;
 pub mod metrics;
 pub mod rates;
 mod read_back;

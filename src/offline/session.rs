@@ -12,7 +12,7 @@ use crate::gpu::upload::{BufferUpload, ImageUpload};
 use crate::offline::error::{Error, Result};
 use crate::offline::headless::Headless;
 use crate::offline::lobe_cache;
-use crate::offline::mesh::Mesh;
+use crate::offline::mesh_buffers::MeshBuffers;
 use crate::offline::read_back::copy_buffer;
 use crate::offline::world::{Camera, World};
 use crate::pass::PassContext;
@@ -31,24 +31,6 @@ use std::time::Instant;
 const MESHES: &str = "meshes";
 /// Near plane of the rasteriser as a fraction of the scene's reach; there is no far plane.
 const NEAR: f64 = 1e-3;
-
-struct MeshBuffers {
-    /// Kept, so that no other mesh is at its address.
-    _mesh: Arc<Mesh>,
-    positions: Buffer,
-    normals: Buffer,
-    coordinates: Buffer,
-    tangents: Option<Buffer>,
-    indices: Buffer,
-    count: u32,
-}
-
-impl MeshBuffers {
-    fn retire(self, bag: &mut Retired) {
-        let all = [self.positions, self.normals, self.coordinates, self.indices];
-        all.into_iter().chain(self.tangents).for_each(|buffer| buffer.retire(bag));
-    }
-}
 
 /// What every frame of the session shows.
 struct Shown {
@@ -136,7 +118,8 @@ impl Session {
         headless.submit(|cmd, memory| Ok(unsafe { renderer.record_materials(cmd, &materials, memory) }?))?;
         // Beside the work on the processor, with which the rest of it is told.
         let of_maps = |name: &&str| [crate::pass::brdf_map::NAME, crate::pass::vmf_mips::NAME].contains(name);
-        let on_device: SetupTimes = renderer.set_up_times()?.passes.into_iter().filter(|(name, _)| of_maps(name)).collect();
+        let on_device: SetupTimes =
+            renderer.set_up_timings()?.unwrap_or_default().passes.into_iter().filter(|(name, _)| of_maps(name)).collect();
         let others: f64 = on_device.iter().map(|(_, time)| time).sum();
         setup.push((crate::pass::materials::NAME, milliseconds(clock) - others));
         setup.extend(on_device);
@@ -185,55 +168,20 @@ impl Session {
         for (number, object) in (0u32..).zip(&world.objects) {
             let key = Arc::as_ptr(&object.mesh) as usize;
             if !self.meshes.contains_key(&key) {
-                let buffers = former.remove(&key).map_or_else(|| self.upload_mesh(&object.mesh), Ok)?;
+                let buffers = match former.remove(&key) {
+                    Some(buffers) => buffers,
+                    None => {
+                        let renderer = self.renderer.as_ref().ok_or_else(closed)?;
+                        MeshBuffers::upload(&mut self.headless, renderer.context(), &object.mesh)?
+                    }
+                };
                 self.meshes.insert(key, buffers);
             }
             let Some(mesh) = self.meshes.get(&key) else { continue };
-            self.shown.draws.push(Draw {
-                positions: (mesh.positions.handle, 0),
-                normals: (mesh.normals.handle, 0),
-                coordinates: (mesh.coordinates.handle, 0),
-                tangents: mesh.tangents.as_ref().map(|b| (b.handle, 0)),
-                indices: (mesh.indices.handle, 0),
-                index_count: mesh.count,
-                world_from_object: object.transform.to_cols_array(),
-                material: object.material as u32,
-                object: number,
-            });
+            let world_from_object = object.transform.to_cols_array();
+            self.shown.draws.push(mesh.draw(world_from_object, object.material as u32, number));
         }
         Ok(())
-    }
-
-    fn upload_mesh(&mut self, mesh: &Arc<Mesh>) -> Result<MeshBuffers> {
-        let renderer = self.renderer.as_mut().ok_or_else(closed)?;
-        let mut uploaded = None;
-        self.headless.submit(|cmd, memory| {
-            let vertex = vk::BufferUsageFlags::VERTEX_BUFFER;
-            let uploads = Build::run(renderer.context(), memory, |build| {
-                let tangents: &[u8] = bytemuck::cast_slice(&mesh.tangents);
-                let uploads = [
-                    BufferUpload::new(build, "positions", vertex, bytemuck::cast_slice(&mesh.positions))?,
-                    BufferUpload::new(build, "normals", vertex, bytemuck::cast_slice(&mesh.normals))?,
-                    BufferUpload::new(build, "coordinates", vertex, bytemuck::cast_slice(&mesh.uvs))?,
-                    BufferUpload::new(build, "indices", vk::BufferUsageFlags::INDEX_BUFFER, bytemuck::cast_slice(&mesh.indices))?,
-                ];
-                let tangents =
-                    (!tangents.is_empty()).then(|| BufferUpload::new(build, "tangents", vertex, tangents)).transpose()?;
-                Ok((uploads, tangents))
-            })?;
-            let mut bag = Retired::default();
-            // The wait at the end of the submission is all the synchronization that vertex input needs.
-            let mut states = States::default();
-            let mut rec = Recorder::new(renderer.context(), cmd, 0, &mut states, None);
-            let (uploads, tangents) = uploads;
-            let [positions, normals, coordinates, indices] = uploads.map(|u| u.record(&mut rec, &mut bag));
-            let tangents = tangents.map(|u| u.record(&mut rec, &mut bag));
-            let count = mesh.indices.len() as u32;
-            let _mesh = Arc::clone(mesh);
-            uploaded = Some(MeshBuffers { _mesh, positions, normals, coordinates, tangents, indices, count });
-            Ok(bag)
-        })?;
-        uploaded.ok_or_else(closed)
     }
 
     /// Renders one frame into the renderer's own images and waits for it.

@@ -8,15 +8,16 @@ use crate::frequency::level::samples_per_cycle;
 use crate::frequency::operators::{Combine, Operator};
 use crate::gpu::access::Access;
 use crate::gpu::buffer::Buffer;
-use crate::gpu::image::Image;
+use crate::gpu::image::{Image, ImageDesc};
+use crate::gpu::memory::Location;
 use crate::gpu::pipeline::{BridgeSets, ComputePipeline, Interface, Resource};
 use crate::gpu::recorder::Recorder;
-use crate::gpu::retire::Retired;
+use crate::gpu::retire::{Build, Retired};
 use crate::gpu::sampler::Samplers;
 use crate::pass::environment::EnvironmentImages;
 use crate::pass::materials::{Bandwidths, MaterialImages};
 use crate::pass::{PassContext, classify, level, pyramid};
-use ash::vk::DescriptorType as D;
+use ash::vk::{self, DescriptorType as D};
 use bytemuck::{Pod, Zeroable};
 
 /// Pass, shader, label, timer and AOV name.
@@ -103,6 +104,30 @@ pub(crate) fn list_bytes(extent: [u32; 2]) -> u64 {
     4 * (u64::from(first_blocks(extent)) + u64::from(extent[0]) * u64::from(extent[1]))
 }
 
+/// What the pass writes beside levels.
+pub(crate) struct Prediction {
+    /// Of each block: bandwidth in cycles/sample, the integrand's relative standard deviation and the logarithm to base 2 of the
+    /// weight by which directions are shared out; 0 where all samples are shaded alike.
+    pub image: Image,
+    /// Which of the next passes run.
+    pub forecast: Buffer,
+    /// The blocks that are predicted.
+    pub blocks: Buffer,
+}
+
+impl Prediction {
+    pub fn new(build: &mut Build<'_>, desc: ImageDesc) -> Result<Self> {
+        let list = vk::BufferUsageFlags::STORAGE_BUFFER | vk::BufferUsageFlags::TRANSFER_SRC;
+        let groups = list | vk::BufferUsageFlags::INDIRECT_BUFFER | vk::BufferUsageFlags::TRANSFER_DST;
+        let [width, height, _] = desc.extent;
+        Ok(Self {
+            image: Image::new(build, desc)?,
+            forecast: Buffer::new(build, "forecast", FORECAST_BYTES, groups, Location::Device)?,
+            blocks: Buffer::new(build, "predicted", list_bytes([width, height]), list, Location::Device)?,
+        })
+    }
+}
+
 pub(crate) struct Io<'a> {
     pub frame: &'a Buffer,
     pub bridge: BridgeSets,
@@ -123,13 +148,8 @@ pub(crate) struct Io<'a> {
     pub level: &'a Image,
     /// Radiance that is added to the mean where directions are shared out by relative deviation.
     pub dark: f32,
-    /// Out: of each block, bandwidth in cycles/sample, the integrand's relative standard deviation and the logarithm to base 2 of
-    /// the weight by which directions are shared out; 0 where all samples are shaded alike.
-    pub prediction: &'a Image,
-    /// Out: which of the next passes run.
-    pub forecast: &'a Buffer,
-    /// Out: the blocks that are predicted.
-    pub blocks: &'a Buffer,
+    /// Out.
+    pub prediction: &'a Prediction,
 }
 
 /// The list of blocks; the prediction for frames without lights beside the environment and for frames with.
@@ -176,6 +196,7 @@ impl Bandwidth {
     }
 
     pub fn record(&self, rec: &mut Recorder<'_>, io: &Io<'_>) {
+        let Prediction { image: prediction, forecast, blocks } = io.prediction;
         rec.begin(NAME);
         io.environment.sampled(rec);
         io.materials.sampled(rec);
@@ -185,32 +206,32 @@ impl Bandwidth {
         rec.image(io.normals, Access::COMPUTE_SAMPLED);
         rec.image(io.factors, Access::COMPUTE_SAMPLED);
         level::clear(rec, io.level, 0);
-        level::clear(rec, io.prediction, 0);
+        level::clear(rec, prediction, 0);
         rec.image(io.level, Access::COMPUTE_WRITE);
-        rec.image(io.prediction, Access::COMPUTE_WRITE);
-        rec.buffer(io.forecast, Access::TRANSFER_WRITE);
+        rec.image(prediction, Access::COMPUTE_WRITE);
+        rec.buffer(forecast, Access::TRANSFER_WRITE);
         rec.flush();
         let cells = io.level.extent().map(|e| e.div_ceil(pyramid::TILE));
         let [_, across, stripes] = classify::groups_of_all(io.level.extent());
         let none = [0, 1, 1];
-        let mut forecast = [0; FORECAST_WORDS];
-        forecast[..3].copy_from_slice(&none);
-        forecast[4..7].copy_from_slice(&[cells[0], cells[1], 1]);
-        forecast[8..11].copy_from_slice(&[0, across, stripes]);
-        forecast[12..15].copy_from_slice(&none);
+        let mut words = [0; FORECAST_WORDS];
+        words[..3].copy_from_slice(&none);
+        words[4..7].copy_from_slice(&[cells[0], cells[1], 1]);
+        words[8..11].copy_from_slice(&[0, across, stripes]);
+        words[12..15].copy_from_slice(&none);
         // SAFETY: the command buffer is recording outside a render pass; the buffer holds as much.
-        unsafe { rec.cx.device.cmd_update_buffer(rec.cmd, io.forecast.handle, 0, bytemuck::bytes_of(&forecast)) };
-        rec.buffer(io.forecast, Access::COMPUTE_ATOMIC);
-        rec.buffer(io.blocks, Access::COMPUTE_WRITE);
+        unsafe { rec.cx.device.cmd_update_buffer(rec.cmd, forecast.handle, 0, bytemuck::bytes_of(&words)) };
+        rec.buffer(forecast, Access::COMPUTE_ATOMIC);
+        rec.buffer(blocks, Access::COMPUTE_WRITE);
         rec.flush();
-        let all = first_blocks(io.prediction.extent());
-        let found = [Resource::Uniform(io.frame), Resource::Buffer(io.forecast), Resource::Buffer(io.blocks)];
+        let all = first_blocks(prediction.extent());
+        let found = [Resource::Uniform(io.frame), Resource::Buffer(forecast), Resource::Buffer(blocks)];
         self.blocks.bind(rec, io.bridge, &found, &BlocksPush { side: self.push.side, stride: STRIDE as i32, all });
-        self.blocks.dispatch(rec, io.prediction.extent());
-        rec.buffer(io.forecast, Access::INDIRECT);
+        self.blocks.dispatch(rec, prediction.extent());
+        rec.buffer(forecast, Access::INDIRECT);
         rec.flush();
-        rec.buffer(io.forecast, Access::COMPUTE_ATOMIC);
-        rec.buffer(io.blocks, Access::COMPUTE_READ);
+        rec.buffer(forecast, Access::COMPUTE_ATOMIC);
+        rec.buffer(blocks, Access::COMPUTE_READ);
         rec.flush();
         let resources = [
             Resource::Uniform(io.frame),
@@ -221,26 +242,26 @@ impl Bandwidth {
             Resource::Sampled(io.environment_bandwidth, io.samplers.nearest),
             Resource::Sampled(&io.material_bandwidths.lobes, io.samplers.nearest),
             Resource::Storage(io.level.view),
-            Resource::Storage(io.prediction.view),
+            Resource::Storage(prediction.view),
             Resource::Buffer(io.lights),
-            Resource::Buffer(io.forecast),
-            Resource::Buffer(io.blocks),
+            Resource::Buffer(forecast),
+            Resource::Buffer(blocks),
             Resource::Buffer(&io.material_bandwidths.textures),
         ];
         let pipeline = &self.pipelines[usize::from(io.light_count > 0)];
         let push = Push { all, dark: io.dark, ..self.push };
         pipeline.bind(rec, io.bridge, &resources, &Push { early: 1, ..push });
-        pipeline.dispatch_indirect(rec, io.forecast, OF_FIRST);
+        pipeline.dispatch_indirect(rec, forecast, OF_FIRST);
         // Where many samples are to be shaded, nothing follows: finding the others would take longer than they do.
-        rec.buffer(io.forecast, Access::INDIRECT);
+        rec.buffer(forecast, Access::INDIRECT);
         rec.image(io.level, Access::COMPUTE_WRITE);
-        rec.image(io.prediction, Access::COMPUTE_WRITE);
+        rec.image(prediction, Access::COMPUTE_WRITE);
         rec.flush();
         // To the validation layer every dispatch of the module writes all that it binds.
-        rec.buffer(io.forecast, Access::COMPUTE_ATOMIC);
+        rec.buffer(forecast, Access::COMPUTE_ATOMIC);
         rec.flush();
         pipeline.push(rec, &push);
-        pipeline.dispatch_indirect(rec, io.forecast, 0);
+        pipeline.dispatch_indirect(rec, forecast, 0);
         rec.end();
     }
 
