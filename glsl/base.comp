@@ -5,10 +5,12 @@
 layout(constant_id = 0) const bool KERNEL = false;
 #define MATERIAL_KERNEL KERNEL
 #define PREFILTER_BINDING 5
+#define LOBES_BINDING 9
 #include "frame.glsl"
 #include "gbuffer.glsl"
 #include "materials.glsl"
 #include "local.glsl"
+#include "lobes.glsl"
 #include "lights.glsl"
 #include "prefilter.glsl"
 #include "reflected.glsl"
@@ -18,6 +20,9 @@ layout(local_size_x = 8, local_size_y = 8) in;
 // Whether the frame has lights beside the environment.
 layout(constant_id = 1) const bool LOCAL_LIGHTS = false;
 
+// Where the filter finds lobes: whether there are materials beside, which stay as they are.
+layout(constant_id = 10) const bool UNFILTERED = true;
+
 layout(set = 2, binding = 1) uniform sampler2D normals;  // as the filter pass writes them
 layout(set = 2, binding = 2) uniform usampler2D factors;
 layout(set = 2, binding = 3, std430) readonly buffer Lights {
@@ -26,12 +31,19 @@ layout(set = 2, binding = 3, std430) readonly buffer Lights {
 layout(set = 2, binding = 4, rgba32f) uniform writeonly image2D radiance;
 
 // What light from unit world direction w adds, of irradiance `power` at normal incidence.
-vec3 reflected_light(Local f, Material m, vec3 w, vec3 power) {
+vec3 reflected_light(Local f, Material m, Lobes l, vec3 w, vec3 power) {
     vec3 wi = vec3(dot(w, f.x), dot(w, f.y), dot(w, f.z));
     bool above = wi.z > 0.0;
     wi = above ? wi : f.view;
-    vec3 value = material_evaluate(m, wi, f.view, normalize(wi + f.view)) * power * wi.z;
-    return above ? value : vec3(0.0);
+    vec3 h = normalize(wi + f.view), value = vec3(0.0);
+    if (UNFILTERED) {
+        value = material_evaluate(m, wi, f.view, h) * wi.z;
+    }
+    if (LOBED) {
+        vec3 found = lobes_evaluate(m, l, wi, f.view, h).rgb;
+        value = l.count > 0u ? found : value;
+    }
+    return above ? value * power : vec3(0.0);
 }
 
 void main() {
@@ -45,19 +57,26 @@ void main() {
     Material m = material_load(gbuffer_material(p), f.view.z, tangent_turn(f, tangent_decode(normal.xyz, normal.w)),
         factors_unpack(texelFetch(factors, p, 0)));
 
+    Lobes l = lobes_load(p, f, m);
+
     vec3 sum = reflected_diffuse(m, f.view) * prefiltered_irradiance(f.z);
-    for (uint i = 0u; i < reflected_count(m); ++i) {
+    uint own = LOBED && l.count > 0u ? 0u : reflected_count(m);
+    for (uint i = 0u; UNFILTERED && i < own; ++i) {
         ReflectedLobe lobe = reflected_lobe(m, i, f.view);
         sum += lobe.weight * prefiltered(to_world(f, lobe.direction), lobe.kappa);
     }
+    for (uint i = 0u; LOBED && i < l.count; ++i) {
+        ReflectedLobe lobe = reflected_found(m, l, i, f.view);
+        sum += lobe.weight * prefiltered(to_world(f, lobe.direction), lobe.kappa);
+    }
     for (uint i = 0u; i < prefiltered_suns(); ++i) {
-        sum += reflected_light(f, m, prefiltered_sun(i), prefiltered_sun_irradiance(i));
+        sum += reflected_light(f, m, l, prefiltered_sun(i), prefiltered_sun_irradiance(i));
     }
     if (LOCAL_LIGHTS) {
         vec3 at = frame.eye.xyz + ray * gbuffer_depth(p);
         for (uint i = 0u; i < frame.lights.x; ++i) {
             vec4 w = light_exact(lights[i], at);
-            sum += reflected_light(f, m, w.xyz, lights[i].power.rgb * w.w);
+            sum += reflected_light(f, m, l, w.xyz, lights[i].power.rgb * w.w);
         }
     }
     imageStore(radiance, p, vec4(sum, 1.0));

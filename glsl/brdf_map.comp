@@ -1,5 +1,5 @@
 #version 460
-// The moments of each texel of one material: its lobe under the normals and the roughness that its maps have there (Xu et al. 2017,
+// The moments of each texel of one material: its lobes under the normals and the roughness that its maps have there (Xu et al. 2017,
 // section 4), in the tangent frame. src/distribution/brdf_map.rs and effective.rs are the f64 twins.
 #include "cover.glsl"
 #include "moments.glsl"
@@ -12,13 +12,16 @@ layout(set = 2, binding = 0) uniform sampler2DArray normals;   // x and y
 layout(set = 2, binding = 1) uniform sampler2DArray roughness; // a value
 layout(set = 2, binding = 2, rgba32f) uniform writeonly image2DArray moments;
 layout(push_constant) uniform Push {
-    int layer;            // of moments
+    vec4 base[MOST_BASE_LOBES]; // lobes about the normal: mean direction; spread without a map of roughness
+    vec4 weights;
+    uint count;
+    uint lobes;           // LOBES_* of moments.glsl
+    int layer;            // first of moments
     int normal_layer;     // below 0 for none
     int roughness_layer;  // below 0 for none
-    uint lobes;           // LOBES_* of moments.glsl
-    float spread;         // of the lobe without a map of roughness
     float rule;           // of the roughness map, and the greatest alpha that it gives
     float most;
+    uint upright;         // whether all lobes are about the normal
 };
 
 // Mean normal as x, y, 1 - z.
@@ -51,22 +54,65 @@ float mean_spread(ivec2 p, ivec2 size) {
     return sum;
 }
 
+// What is stored of a lobe with mean direction mu, stored as x, y, 1 - z: two layers of slopes, else one.
+void encode(vec3 mu, float spread, out vec4 first, out vec4 second) {
+    second = vec4(0.0);
+    if (filter_of_slopes(FILTER)) {
+        vec2 b = slope_of(vec3(mu.xy, 1.0 - mu.z));
+        vec3 products = slope_products(b, vmf_concentration(spread), FILTER == FILTER_LEAN_LOBE);
+        first = vec4(b, products.xz);
+        second.x = products.y;
+    } else if (FILTER == FILTER_VMF1 || filter_of_cells(FILTER)) {
+        first = vec4(mu.xy * (1.0 - spread), mu.z + (1.0 - mu.z) * spread, spread);
+    } else {
+        first = vec4(mu, vmf_concentration(spread));
+    }
+}
+
 void main() {
     ivec2 p = ivec2(gl_GlobalInvocationID.xy), size = imageSize(moments).xy;
     if (any(greaterThanEqual(p, size))) {
         return;
     }
     vec3 normal = normal_layer < 0 ? vec3(0.0) : mean_normal(p, size);
-    float base = roughness_layer < 0 ? spread : mean_spread(p, size);
-    // The lobe's mean direction, and its spread under those normals: means of directions multiply.
     float off = moments_spread(normal, 0.0), along = 1.0 - off;
-    vec3 mu = vec3(normal.xy, normal.z - off) / along;
-    float whole = off + along * base;
-    vec4 stored;
-    if (FILTER == FILTER_VMF1) {
-        stored = vec4(mu.xy * (1.0 - whole), mu.z + (1.0 - mu.z) * whole, whole);
-    } else {
-        stored = vec4(mu, vmf_concentration(whole));
+    vec3 mean = vec3(normal.xy, normal.z - off) / along;
+    vec3 z = vec3(mean.xy, 1.0 - mean.z), x = vec3(1.0, 0.0, 0.0) - z * z.x;
+    float across = dot(x, x);
+    x = across > 1e-12 ? x * inversesqrt(across) : vec3(0.0, 0.0, -1.0);
+    vec3 y = cross(z, x);
+
+    int next = layer;
+    if (upright == 0u) {
+        imageStore(moments, ivec3(p, next++), vec4(mean, 0.0));
     }
-    imageStore(moments, ivec3(p, layer), stored);
+    float of_map = roughness_layer < 0 ? 0.0 : mean_spread(p, size);
+    vec4 first = vec4(0.0), second = vec4(0.0);
+    for (uint i = 0u; i < count; ++i) {
+        // A lobe's mean vector under those normals is along times as long along their mean, (1 + along) / 2 times across it.
+        vec3 mu = base[i].xyz;
+        float square = mu.z * mu.z;
+        float missing = (1.0 - square) * (off - 0.25 * off * off) + square * (2.0 * off - off * off); // 1 - length^2
+        float lost = missing / (1.0 + sqrt(1.0 - missing)), kept = 1.0 - lost;
+        vec3 turned = mean;
+        if (upright == 0u) {
+            vec3 local = mu * vec3(vec2(1.0 - 0.5 * off), along) / kept;
+            turned = x * local.x + y * local.y + z * local.z;
+            turned.z = 1.0 - turned.z;
+        }
+        float spread = lost + kept * (roughness_layer < 0 ? base[i].w : of_map);
+        vec4 a, b;
+        encode(turned, spread, a, b);
+        float weight = filter_merges(FILTER) ? weights[i] : 1.0;
+        first += a * weight;
+        second += b * weight;
+        if (!filter_merges(FILTER) || i + 1u == count) {
+            imageStore(moments, ivec3(p, next++), first);
+            if (filter_of_slopes(FILTER)) {
+                imageStore(moments, ivec3(p, next++), second);
+            }
+            first = vec4(0.0);
+            second = vec4(0.0);
+        }
+    }
 }

@@ -1,13 +1,14 @@
 #version 460
 // What a surface is at the pixel's scale: the shading normal, factors on the reflectance's colours, its roughness and what the
 // surface's own curvature adds to it. Filter `point`: colours through their mips by the footprint, normals and roughness from
-// the base level; `tk` adds the kernel of the interpolated normals' derivatives; the others read normals and concentrations as
-// moments, through mips too. src/material.rs and src/moments.rs are the f64 twins.
+// the base level; `tk` adds the kernel of the interpolated normals' derivatives; the others read both as moments, through mips
+// too, and leave lobes. src/material.rs and src/moments.rs are the f64 twins.
 #include "frame.glsl"
 #include "gbuffer.glsl"
 #include "tangent.glsl"
 #include "factors.glsl"
 #include "moments.glsl"
+#include "oct.glsl"
 #include "roughness.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
@@ -19,17 +20,27 @@ layout(constant_id = 2) const uint NORMAL_CLASSES = 0u;
 layout(constant_id = 3) const uint ROUGHNESS_CLASSES = 0u;
 // Whether the mesh's curvature within the pixel widens lobes.
 layout(constant_id = 4) const bool GEOMETRIC = false;
-// Classes of moments, and what of a texel's makes its lobe: FILTER_* of moments.glsl.
+// Classes of moments and of their cells, and what of a texel's makes its lobes: FILTER_* of moments.glsl.
 layout(constant_id = 5) const uint MOMENT_CLASSES = 0u;
-layout(constant_id = 6) const uint FILTER = 0u;
+layout(constant_id = 6) const uint CELL_CLASSES = 0u;
+layout(constant_id = 7) const uint FILTER = 0u;
+// Layers of `lobes`; 0 where the filter has no lobes of its own.
+layout(constant_id = 8) const uint LOBES = 0u;
+// Most look-ups along the longer axis of a footprint.
+layout(constant_id = 9) const uint ANISOTROPY = 1u;
 
 struct MapRecord {
-    uvec4 places;  // albedo, specular, normal, roughness: 0 for none, else (layer << 3 | class) + 1
-    vec2 tiling;   // factors on uv
-    vec2 rule;     // of the roughness map; the greatest alpha that it gives
-    float without; // albedo factor without an albedo map
-    uint moments;  // as `places`
-    uint lobes;    // LOBES_* of moments.glsl
+    uvec4 places;        // albedo, specular, normal, roughness: 0 for none, else (layer << 3 | class) + 1
+    vec2 tiling;         // factors on uv
+    vec2 rule;           // of the roughness map; the greatest alpha that it gives
+    float without;       // albedo factor without an albedo map
+    uint moments;        // as `places`, the first layer
+    uint cells;
+    uint lobes;          // LOBES_* of moments.glsl
+    vec4 weights;        // of the lobes
+    uint count;          // of them; 0 for those that stay as they are
+    uint upright;        // whether all are about the normal
+    float concentration; // of the one lobe of a material without maps of normals and roughness
     uint unused;
 };
 layout(set = 2, binding = 1, std430) readonly buffer Maps {
@@ -45,34 +56,77 @@ layout(set = 2, binding = 8) uniform sampler2DArray textures_6;
 layout(set = 2, binding = 9) uniform sampler2DArray textures_7;
 layout(set = 2, binding = 10, rgba32f) uniform writeonly image2D normals;   // shading normal; tangent as tangent.glsl encodes it
 layout(set = 2, binding = 11, rgba32ui) uniform writeonly uimage2D factors; // as factors.glsl packs them
+layout(set = 2, binding = 12, rgba32f) uniform writeonly image2DArray lobes; // as lobes.glsl reads them
 
-// The level whose texels are as large as the longer derivative.
-float level(sampler2DArray t, vec4 footprint) {
-    vec2 size = vec2(textureSize(t, 0).xy);
+// What a pixel covers of a map: look-ups along the longer axis, at a level whose texels are as large as the step from one to the
+// next; with one look-up, as large as the longer axis.
+struct Reach {
+    vec2 size; // of the map
+    vec2 axis;
+    float taps;
+    float level;
+};
+
+#define SIZE(i) \
+    if ((classes & (1u << i)) != 0u) { \
+        size = slot == i ? vec2(textureSize(textures_##i, 0).xy) : size; \
+    }
+Reach reach_of(uint classes, uint code, vec4 footprint) {
+    int slot = (int(code) - 1) & 7;
+    vec2 size = vec2(1.0);
+    SIZE(0)
+    SIZE(1)
+    SIZE(2)
+    SIZE(3)
+    SIZE(4)
+    SIZE(5)
+    SIZE(6)
+    SIZE(7)
     vec2 x = footprint.xy * size, y = footprint.zw * size;
-    return 0.5 * log2(max(max(dot(x, x), dot(y, y)), 1.0));
+    float xx = dot(x, x), yy = dot(y, y), major = max(max(xx, yy), 1.0), minor = max(min(xx, yy), 1.0);
+    float taps = clamp(ceil(sqrt(major / minor) - 1e-3), 1.0, float(ANISOTROPY));
+    return Reach(size, xx > yy ? footprint.xy : footprint.zw, taps, 0.5 * log2(max(major / (taps * taps), 1.0)));
 }
 
-// A map's value; `base` looks it up in level 0. Textures count rows from the top, coordinates upwards.
-#define LOOK_UP(i) \
+// Where look-up i is taken.
+vec2 reach_tap(Reach r, vec2 uv, float i) {
+    return uv + r.axis * ((i + 0.5) / r.taps - 0.5);
+}
+
+// A map's value, of `layer` after its own, at a level. Textures count rows from the top, coordinates upwards.
+#define FETCH(i) \
     if ((classes & (1u << i)) != 0u) { \
-        vec4 fetched = textureLod(textures_##i, at, base ? 0.0 : level(textures_##i, footprint)); \
-        value = place.x == float(i) ? fetched : value; \
+        vec4 fetched = textureLod(textures_##i, at, level); \
+        value = slot == i ? fetched : value; \
     }
-vec4 look_up(uint classes, uint code, vec2 uv, vec4 footprint, bool base, vec4 without) {
-    int slot = int(code) - 1;
-    vec2 place = vec2(slot < 0 ? -1 : (slot & 7), max(slot >> 3, 0));
-    vec3 at = slot < 0 ? vec3(0.0) : vec3(uv.x, 1.0 - uv.y, place.y);
-    vec4 value = without;
-    LOOK_UP(0)
-    LOOK_UP(1)
-    LOOK_UP(2)
-    LOOK_UP(3)
-    LOOK_UP(4)
-    LOOK_UP(5)
-    LOOK_UP(6)
-    LOOK_UP(7)
+vec4 fetch(uint classes, uint code, uint layer, vec2 uv, float level) {
+    bool none = code == 0u;
+    int slot = none ? -1 : (int(code) - 1) & 7;
+    vec3 at = none ? vec3(0.0) : vec3(uv.x, 1.0 - uv.y, float((code - 1u >> 3) + layer));
+    vec4 value = vec4(0.0);
+    FETCH(0)
+    FETCH(1)
+    FETCH(2)
+    FETCH(3)
+    FETCH(4)
+    FETCH(5)
+    FETCH(6)
+    FETCH(7)
     return value;
+}
+
+// The mean over what a pixel covers.
+vec4 look_up(uint classes, uint code, uint layer, vec2 uv, Reach r) {
+    vec4 sum = fetch(classes, code, layer, reach_tap(r, uv, 0.0), r.level);
+    for (float i = 1.0; ANISOTROPY > 1u && i < r.taps; ++i) {
+        sum += fetch(classes, code, layer, reach_tap(r, uv, i), r.level);
+    }
+    return sum / r.taps;
+}
+
+vec3 colour(uint classes, uint code, vec2 uv, vec4 footprint, float without) {
+    vec3 value = look_up(classes, code, 0u, uv, reach_of(classes, code, footprint)).rgb;
+    return code == 0u ? vec3(without) : value;
 }
 
 // Isotropic filtering of normal distributions by the derivatives of interpolated normals (Tokuyoshi and Kaplanyan 2021,
@@ -108,6 +162,157 @@ float geometric_kernel(ivec2 p, vec3 n) {
     return min(2.0 * FILTER_VARIANCE * (dot(x, x) + dot(y, y)), MOST_KERNEL);
 }
 
+// A sample's lobes as they are found.
+struct Found {
+    mat3 frame;      // world from tangent frame
+    float kernel;    // what widens them
+    uint count;
+    float sharpest;  // concentration of those that matter
+    vec3 mean;       // of their directions, stored as x, y, 1 - z
+};
+const float MATTERS = 0.02;
+
+void keep(ivec2 p, inout Found f, vec3 mu, float kappa, float weight) {
+    if (weight <= LEAST_WEIGHT || f.count >= LOBES) {
+        return;
+    }
+    kappa /= 1.0 + 0.5 * kappa * f.kernel;
+    vec3 world = f.frame * moments_direction(mu);
+    imageStore(lobes, ivec3(p, int(f.count)), vec4(oct_encode(world), kappa, weight));
+    f.count += 1u;
+    f.sharpest = weight > MATTERS ? max(f.sharpest, kappa) : f.sharpest;
+}
+
+// A Gaussian of slopes: in two layers, in the tangent frame.
+void keep_slopes(ivec2 p, inout Found f, vec4 first, float product, float weight) {
+    if (f.count + 1u >= LOBES) {
+        return;
+    }
+    vec2 variance = max(first.zw - first.xy * first.xy, vec2(LEAST_SLOPE_VARIANCE));
+    float most = 0.9999 * sqrt(variance.x * variance.y);
+    float covariance = clamp(product - first.x * first.y, -most, most);
+    float widened = 0.5 * f.kernel;
+    imageStore(lobes, ivec3(p, int(f.count)), vec4(first.xy, weight, 0.0));
+    imageStore(lobes, ivec3(p, int(f.count) + 1), vec4(variance.x + widened, covariance, variance.y + widened, 0.0));
+    f.count += 2u;
+    f.sharpest = max(f.sharpest, 1.0 / min(variance.x, variance.y));
+}
+
+const uint COUNT = FILTER == FILTER_VMF4 ? 4u : CELLS;
+
+// Weight times characteristic vector, weight; weight times the spread of what is in it.
+struct Cell {
+    vec4 sum;
+    float spread;
+};
+
+float cell_spread(Cell c) {
+    return max(moments_spread(c.sum.xyz / max(c.sum.w, LEAST_WEIGHT), 0.0), VMF_LEAST_SPREAD);
+}
+
+void keep_cell(ivec2 p, inout Found f, Cell c, float share) {
+    if (c.sum.w * share > LEAST_WEIGHT) {
+        keep(p, f, c.sum.xyz / c.sum.w, vmf_concentration(cell_spread(c)), c.sum.w * share);
+    }
+}
+
+// How much of a cell's one lobe stays beside those of its parts: by how far its spread goes beyond that of its lobes.
+float cell_kept(Cell c) {
+    float base = max(c.spread / max(c.sum.w, LEAST_WEIGHT), VMF_LEAST_SPREAD);
+    float t = clamp((1.25 - cell_spread(c) / (1.5 * base)) * 2.0, 0.0, 1.0);
+    return t * t * (3.0 - 2.0 * t);
+}
+
+Cell both(Cell a, Cell b) {
+    return Cell(a.sum + b.sum, a.spread + b.spread);
+}
+
+// The cells of what a pixel covers: between base texels, which have their lobes as they are, and the levels of cells.
+void gather(MapRecord record, vec2 uv, Reach r, uint lobe_layer, out Cell cells[CELLS]) {
+    for (uint i = 0u; i < CELLS; ++i) {
+        cells[i] = Cell(vec4(0.0), 0.0);
+    }
+    float coarse = min(r.level, 1.0), level = max(r.level - 1.0, 0.0);
+    for (float tap = 0.0; tap < r.taps; ++tap) {
+        vec2 at = reach_tap(r, uv, tap);
+        for (uint i = 0u; i < COUNT; ++i) {
+            cells[i].sum += fetch(CELL_CLASSES, record.cells, i, at, level) * (coarse / r.taps);
+        }
+        if (FILTER == FILTER_VMF) {
+            vec4 low = fetch(CELL_CLASSES, record.cells, CELLS, at, level) * (coarse / r.taps);
+            vec4 high = fetch(CELL_CLASSES, record.cells, CELLS + 1u, at, level) * (coarse / r.taps);
+            for (uint i = 0u; i < 4u; ++i) {
+                cells[i].spread += low[i];
+                cells[i + 4u].spread += high[i];
+            }
+        }
+        vec2 place = vec2(at.x, 1.0 - at.y) * r.size - 0.5, first = floor(place), part = place - first;
+        for (uint k = 0u; k < 4u; ++k) {
+            vec2 corner = vec2(k & 1u, k >> 1), share = mix(1.0 - part, part, corner);
+            vec2 centre = (first + corner + 0.5) / r.size;
+            for (uint j = 0u; j < record.count; ++j) {
+                vec4 lobe = fetch(MOMENT_CLASSES, record.moments, lobe_layer + j, vec2(centre.x, 1.0 - centre.y), 0.0);
+                float weight = record.weights[j] * share.x * share.y * ((1.0 - coarse) / r.taps);
+                uint cell = moments_cell(COUNT, vec3(lobe.xy, 1.0 - lobe.z));
+                cells[cell].sum += vec4(lobe.xyz, 1.0) * weight;
+                cells[cell].spread += lobe.w * weight;
+            }
+        }
+    }
+}
+
+// Stores the lobes of a material with moments.
+void decode(ivec2 p, MapRecord record, vec2 uv, vec4 footprint, inout Found f) {
+    Reach r = reach_of(MOMENT_CLASSES, record.moments, footprint);
+    uint layer = record.upright != 0u ? 0u : 1u;
+    if (filter_of_cells(FILTER)) {
+        Cell cells[CELLS];
+        gather(record, uv, r, layer, cells);
+        Cell all = Cell(vec4(0.0), 0.0);
+        for (uint i = 0u; i < COUNT; ++i) {
+            all = both(all, cells[i]);
+        }
+        f.mean = all.sum.xyz / all.sum.w;
+        if (FILTER == FILTER_VMF) {
+            float one = cell_kept(all);
+            keep_cell(p, f, all, one);
+            for (uint i = 0u; i < 4u; ++i) {
+                Cell quarter = both(cells[2u * i], cells[2u * i + 1u]);
+                float kept = cell_kept(quarter);
+                keep_cell(p, f, quarter, (1.0 - one) * kept);
+                keep_cell(p, f, cells[2u * i], (1.0 - one) * (1.0 - kept));
+                keep_cell(p, f, cells[2u * i + 1u], (1.0 - one) * (1.0 - kept));
+            }
+        } else {
+            for (uint i = 0u; i < COUNT; ++i) {
+                keep_cell(p, f, cells[i], 1.0);
+            }
+        }
+    } else {
+        uint count = filter_merges(FILTER) ? min(record.count, 1u) : record.count;
+        float constant = 0.0;
+        for (uint i = 0u; FILTER == FILTER_FIXED && i < count; ++i) {
+            // The map's mean: its last level.
+            constant += record.weights[i] * fetch(MOMENT_CLASSES, record.moments, layer + i, uv, 32.0).w;
+        }
+        for (uint i = 0u; i < count; ++i) {
+            float weight = filter_merges(FILTER) ? 1.0 : record.weights[i];
+            if (filter_of_slopes(FILTER)) {
+                vec4 first = look_up(MOMENT_CLASSES, record.moments, layer + 2u * i, uv, r);
+                keep_slopes(p, f, first, look_up(MOMENT_CLASSES, record.moments, layer + 2u * i + 1u, uv, r).x, weight);
+                continue;
+            }
+            vec4 moments = look_up(MOMENT_CLASSES, record.moments, layer + i, uv, r);
+            moments.w = FILTER == FILTER_FIXED ? constant : moments.w;
+            f.mean = i == 0u ? moments.xyz : f.mean;
+            keep(p, f, moments.xyz, moments_concentration(FILTER, moments), weight);
+        }
+    }
+    if (record.upright == 0u) {
+        f.mean = look_up(MOMENT_CLASSES, record.moments, 0u, uv, r).xyz;
+    }
+}
+
 void main() {
     ivec2 p = ivec2(gl_GlobalInvocationID.xy);
     if (any(greaterThanEqual(uvec2(p), frame.extent.xy)) || !gbuffer_covered(p)) {
@@ -120,11 +325,11 @@ void main() {
     vec4 t = gbuffer_tangent(p);
 
     Factors f;
-    f.albedo = look_up(ALBEDO_CLASSES, record.places.x, uv, footprint, false, vec4(record.without)).rgb;
-    f.specular = look_up(SPECULAR_CLASSES, record.places.y, uv, footprint, false, vec4(1.0)).rgb;
+    f.albedo = colour(ALBEDO_CLASSES, record.places.x, uv, footprint, record.without);
+    f.specular = colour(SPECULAR_CLASSES, record.places.y, uv, footprint, 1.0);
     f.alpha = NO_ALPHA;
     if (ROUGHNESS_CLASSES != 0u) {
-        float v = look_up(ROUGHNESS_CLASSES, record.places.w, uv, footprint, true, vec4(1.0)).x;
+        float v = fetch(ROUGHNESS_CLASSES, record.places.w, 0u, uv, 0.0).x;
         f.alpha = record.places.w != 0u ? alpha_by_rule(record.rule.x, v, record.rule.y) : NO_ALPHA;
     }
     f.kernel = 0.0;
@@ -132,22 +337,33 @@ void main() {
         f.kernel = geometric_kernel(p, n);
     }
     if (NORMAL_CLASSES != 0u) {
-        vec2 xy = look_up(NORMAL_CLASSES, record.places.z, uv, footprint, true, vec4(0.0)).xy;
+        vec2 xy = fetch(NORMAL_CLASSES, record.places.z, 0u, uv, 0.0).xy;
         vec3 local = vec3(xy, sqrt(max(1.0 - dot(xy, xy), 0.0)));
         vec3 bent = normalize(t.xyz * local.x + cross(n, t.xyz) * (t.w * local.y) + n * local.z);
         n = record.places.z != 0u && t.w != 0.0 ? bent : n;
     }
-    if (MOMENT_CLASSES != 0u) {
-        vec4 moments = look_up(MOMENT_CLASSES, record.moments, uv, footprint, false, vec4(0.0));
-        if (FILTER == FILTER_FIXED) {
-            // The map's mean: its last level.
-            moments.w = look_up(MOMENT_CLASSES, record.moments, uv, vec4(1e4), false, vec4(0.0)).w;
+    if (LOBES > 0u) {
+        vec3 x, y;
+        tangent_basis(n, x, y);
+        x = t.w != 0.0 ? t.xyz : x;
+        y = t.w != 0.0 ? cross(n, x) * t.w : y;
+        Found found = Found(mat3(x, y, n), f.kernel, 0u, 0.0, vec3(0.0));
+        if (record.moments != 0u) {
+            decode(p, record, uv, footprint, found);
+        } else if (filter_of_slopes(FILTER)) {
+            if (record.count > 0u) {
+                keep_slopes(p, found, vec4(0.0, 0.0, vec2(1.0 / max(record.concentration, LEAST_SLOPE_CONCENTRATION))), 0.0, 1.0);
+            }
+        } else if (record.count > 0u) {
+            keep(p, found, vec3(0.0), record.concentration, 1.0);
         }
-        float alpha = clamp(moments_alpha(FILTER, moments, record.lobes), LEAST_ALPHA, record.rule.y);
-        f.alpha = record.moments != 0u && record.lobes != LOBES_STAY ? alpha : f.alpha;
-        vec3 local = normalize(vec3(moments.xy, 1.0 - moments.z));
-        vec3 bent = normalize(t.xyz * local.x + cross(n, t.xyz) * (t.w * local.y) + n * local.z);
-        n = record.moments != 0u && t.w != 0.0 ? bent : n;
+        if (found.count < LOBES) {
+            imageStore(lobes, ivec3(p, int(found.count)), vec4(0.0));
+        }
+        // What predicts bandwidth knows of one lobe only.
+        f.alpha = found.count > 0u ? clamp(moments_alpha(found.sharpest, record.lobes), LEAST_ALPHA, record.rule.y) : f.alpha;
+        f.kernel = found.count > 0u ? 0.0 : f.kernel;
+        n = filter_of_slopes(FILTER) && record.count > 0u ? n : found.frame * moments_direction(found.mean);
     }
     imageStore(normals, p, vec4(n, tangent_encode(n, t.xyz, t.w)));
     imageStore(factors, p, factors_pack(f));

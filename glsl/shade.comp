@@ -4,6 +4,7 @@
 // Whether the filter widens lobes.
 layout(constant_id = 3) const bool KERNEL = false;
 #define MATERIAL_KERNEL KERNEL
+#define LOBES_BINDING 10
 #include "frame.glsl"
 #include "gbuffer.glsl"
 #include "materials.glsl"
@@ -11,6 +12,7 @@ layout(constant_id = 3) const bool KERNEL = false;
 #include "environment.glsl"
 #include "lights.glsl"
 #include "sobol.glsl"
+#include "lobes.glsl"
 #include "list.glsl"
 #include "levels.glsl"
 
@@ -30,6 +32,8 @@ layout(constant_id = 2) const bool LEVELLED = false;
 layout(constant_id = 4) const int SHARING = 0;
 // Whether entries carry a number of directions.
 layout(constant_id = 5) const bool ALLOCATED = false;
+// Where the filter finds lobes: whether there are materials beside, which stay as they are.
+layout(constant_id = 10) const bool UNFILTERED = true;
 
 layout(set = 2, binding = 3, std430) readonly buffer Arguments {
     uint groups_x, groups_y, groups_z;
@@ -85,22 +89,59 @@ void split(uint n) {
     environment_samples = push.environment_samples > 0u ? uint(max(int(other) - int(light_samples * area), 1)) : 0u;
 }
 
+// What the surface does with light.
+struct Surface {
+    Local frame;
+    Material material;
+    Lobes lobes;
+};
+
+bool lobed(Surface s) {
+    return LOBED && (!UNFILTERED || s.lobes.count > 0u);
+}
+
+// Reflectance times the cosine for light from local wi above the horizon, h the half vector, and in a the density per steradian
+// of wi for the weights of directions.
+vec4 reflected(Surface s, vec3 wi, vec3 h) {
+    vec3 wo = s.frame.view;
+    vec4 of_lobes = vec4(0.0);
+    if (LOBED) {
+        of_lobes = lobes_evaluate(s.material, s.lobes, wi, wo, h);
+    }
+    vec4 whole = vec4(0.0);
+    if (UNFILTERED) {
+        whole = vec4(material_evaluate(s.material, wi, wo, h) * wi.z, material_density(s.material, h) * 0.25 / dot(wo, h));
+    }
+    return lobed(s) ? of_lobes : whole;
+}
+
 // Contribution of a direction drawn from the reflectance, seen from world point p. The environment and every area light
 // weigh it against their own samples (balance heuristic, one light at a time: lights add up).
-vec3 brdf_contribution(Local f, Material m, vec3 p, uvec2 u) {
-    vec4 h = material_sample(m, u);
-    float cos_d = dot(f.view, h.xyz);
-    vec3 wi = h.xyz * (2.0 * cos_d) - f.view;
-    if (cos_d <= 0.0 || wi.z <= 0.0) {
+vec3 brdf_contribution(Surface s, vec3 p, uvec2 u) {
+    vec3 wi = vec3(0.0, 0.0, -1.0), h = vec3(0.0, 0.0, 1.0);
+    float drawn = 0.0; // density per steradian of wi; 0 if it is that of the weights
+    if (UNFILTERED) {
+        vec4 half_vector = material_sample(s.material, u);
+        float cos_d = dot(s.frame.view, half_vector.xyz);
+        h = half_vector.xyz;
+        wi = cos_d > 0.0 ? h * (2.0 * cos_d) - s.frame.view : wi;
+        drawn = half_vector.w * 0.25 / max(cos_d, 1e-30);
+    }
+    if (lobed(s)) {
+        wi = lobes_sample(s.material, s.lobes, s.frame.view, u);
+        h = normalize(wi + s.frame.view);
+        drawn = 0.0;
+    }
+    if (wi.z <= 0.0) {
         return vec3(0.0);
     }
-    vec3 w = to_world(f, wi);
+    vec3 w = to_world(s.frame, wi);
     vec4 light = environment_lookup(w);
-    vec3 value = material_evaluate(m, wi, f.view, h.xyz) * wi.z;
-    float jacobian = 0.25 / cos_d;
+    vec4 value = reflected(s, wi, h);
     bool alone = ESTIMATOR != ESTIMATOR_MIS;
-    float weight_density = alone ? h.w : material_density(m, h.xyz);
-    float brdf = float(brdf_samples) * weight_density * jacobian;
+    drawn = drawn > 0.0 ? drawn : value.a;
+    float weight_density = alone ? drawn : value.a;
+    float brdf = float(brdf_samples) * weight_density;
     float environment = alone ? 0.0 : float(environment_samples) * environment_per_steradian(light.a, length(w.xz));
     vec3 sum = light.rgb / (brdf + environment);
     for (uint i = 0u; LOCAL_LIGHTS && i < frame.lights.y; ++i) {
@@ -108,11 +149,12 @@ vec3 brdf_contribution(Local f, Material m, vec3 p, uvec2 u) {
         float competing = alone ? 0.0 : float(light_samples) * density;
         sum += density > 0.0 ? lights[frame.lights.x + i].power.rgb / (brdf + competing) : vec3(0.0);
     }
-    return value * sum * (weight_density / h.w);
+    return value.rgb * sum * (weight_density / drawn);
 }
 
 // Contribution of a direction drawn from the environment.
-vec3 environment_contribution(Local f, Material m, uvec2 u) {
+vec3 environment_contribution(Surface s, uvec2 u) {
+    Local f = s.frame;
     vec2 uv = environment_place(u);
     vec4 w = environment_direction(uv);
     vec3 wi = vec3(dot(w.xyz, f.x), dot(w.xyz, f.y), dot(w.xyz, f.z));
@@ -121,44 +163,44 @@ vec3 environment_contribution(Local f, Material m, uvec2 u) {
     uv = above ? uv : vec2(0.0);
     wi = above ? wi : vec3(0.0, 0.0, 1.0);
     vec4 light = environment_fetch(uv);
-    vec3 h = normalize(wi + f.view);
+    vec4 value = reflected(s, wi, normalize(wi + f.view));
     float environment = float(environment_samples) * environment_per_steradian(light.a, w.w);
-    float brdf = float(brdf_samples) * material_density(m, h) * 0.25 / dot(f.view, h);
-    vec3 value = material_evaluate(m, wi, f.view, h) * light.rgb * wi.z / (brdf + environment);
-    return above ? value : vec3(0.0);
+    float brdf = float(brdf_samples) * value.a;
+    return above ? value.rgb * light.rgb / (brdf + environment) : vec3(0.0);
 }
 
 // Contribution of a direction drawn from an area light.
-vec3 light_contribution(Local f, Material m, vec3 p, LightRecord light, uvec2 u) {
+vec3 light_contribution(Surface s, vec3 p, LightRecord light, uvec2 u) {
+    Local f = s.frame;
     vec3 w = light_sample(light, p, vec2(to_unit(u.x), to_unit(u.y)));
     vec3 wi = vec3(dot(w, f.x), dot(w, f.y), dot(w, f.z));
     float density = light_density(light, p, w);
     if (wi.z <= 0.0 || density <= 0.0) {
         return vec3(0.0);
     }
-    vec3 h = normalize(wi + f.view);
-    float brdf = float(brdf_samples) * material_density(m, h) * 0.25 / dot(f.view, h);
-    return material_evaluate(m, wi, f.view, h) * light.power.rgb * wi.z / (brdf + float(light_samples) * density);
+    vec4 value = reflected(s, wi, normalize(wi + f.view));
+    return value.rgb * light.power.rgb / (float(brdf_samples) * value.a + float(light_samples) * density);
 }
 
 // What the exact lights add.
-vec3 exact_lights(Local f, Material m, vec3 p) {
+vec3 exact_lights(Surface s, vec3 p) {
+    Local f = s.frame;
     vec3 sum = vec3(0.0);
     for (uint i = 0u; i < frame.lights.x; ++i) {
         vec4 w = light_exact(lights[i], p);
         vec3 wi = vec3(dot(w.xyz, f.x), dot(w.xyz, f.y), dot(w.xyz, f.z));
         if (wi.z > 0.0) {
-            sum += material_evaluate(m, wi, f.view, normalize(wi + f.view)) * lights[i].power.rgb * (w.w * wi.z);
+            sum += reflected(s, wi, normalize(wi + f.view)).rgb * lights[i].power.rgb * w.w;
         }
     }
     return sum;
 }
 
 // Reflectance and radiance in an arbitrary direction: no estimate, but the look-ups that every estimate is made of.
-vec3 lookup(Local f, Material m, uint u) {
+vec3 lookup(Surface s, uint u) {
     vec3 wi = normalize(vec3(uvec3(u, u >> 10, u >> 20) & 1023u) - 511.25);
     wi.z = abs(wi.z);
-    return material_evaluate(m, wi, f.view, normalize(wi + f.view)) * environment_lookup(to_world(f, wi)).rgb;
+    return reflected(s, wi, normalize(wi + s.frame.view)).rgb * environment_lookup(to_world(s.frame, wi)).rgb;
 }
 
 // Stores the radiance at sample p, which stands for a cell of level l.
@@ -202,12 +244,13 @@ void main() {
     vec3 at = frame.eye.xyz + ray * gbuffer_depth(p);
     Material m = material_load(gbuffer_material(p), f.view.z, tangent_turn(f, tangent_decode(normal.xyz, normal.w)),
         factors_unpack(texelFetch(factors, p, 0)));
+    Surface s = Surface(f, m, lobes_load(p, f, m));
 
     uint seed = hash((uint(whose.y) << 16 | uint(whose.x)) ^ hash(frame.sampling.x ^ hash(frame.sampling.y)));
     vec3 sum = vec3(0.0);
     if (ESTIMATOR == ESTIMATOR_LOOKUP) {
         for (uint i = 0u; i < brdf_samples; ++i) {
-            sum += lookup(f, m, hash(seed + i));
+            sum += lookup(s, hash(seed + i));
         }
         store(p, l, sum);
         return;
@@ -215,22 +258,22 @@ void main() {
     uvec2 seeds = sobol_seeds(seed);
     for (uint i = 0u; i < brdf_samples; ++i) {
         uint point = before * brdf_samples + i;
-        sum += brdf_contribution(f, m, at, ESTIMATOR == ESTIMATOR_BRDF_RANDOM ? random_point(point, seed) : sobol_point(point, seeds));
+        sum += brdf_contribution(s, at, ESTIMATOR == ESTIMATOR_BRDF_RANDOM ? random_point(point, seed) : sobol_point(point, seeds));
     }
     if (ESTIMATOR == ESTIMATOR_MIS) {
         seeds = sobol_seeds(seed + 1u);
         for (uint i = 0u; i < environment_samples; ++i) {
-            sum += environment_contribution(f, m, sobol_point(before * environment_samples + i, seeds));
+            sum += environment_contribution(s, sobol_point(before * environment_samples + i, seeds));
         }
         for (uint k = 0u; LOCAL_LIGHTS && k < frame.lights.y; ++k) {
             seeds = sobol_seeds(seed + 2u + k);
             for (uint i = 0u; i < light_samples; ++i) {
-                sum += light_contribution(f, m, at, lights[frame.lights.x + k], sobol_point(before * light_samples + i, seeds));
+                sum += light_contribution(s, at, lights[frame.lights.x + k], sobol_point(before * light_samples + i, seeds));
             }
         }
     }
     if (LOCAL_LIGHTS) {
-        sum += exact_lights(f, m, at);
+        sum += exact_lights(s, at);
     }
     store(p, l, sum);
 }

@@ -47,9 +47,10 @@ pub enum Rate {
     Luminance,
 }
 
-/// How a material is read at a pixel's scale. Filters that read through mips turn GGX, Blinn-Phong and one vMF lobe about the
-/// normal into one lobe for each pixel, wherever the material has a map of normals or roughness; tables and other vMF mixtures
-/// keep their lobes about the mean normal ([`crate::Moments`]).
+/// How a material is read at a pixel's scale. Filters that read normals and roughness through mips make lobes of them, in the place
+/// of the model's own: of GGX, Blinn-Phong and vMF lobes about the normal each one a facet, with its direction for a normal; of
+/// mixtures of at most [`MOST_BASE_LOBES`] other vMF lobes one distribution of normals. Tables and larger mixtures keep their lobes,
+/// about the mean normal ([`crate::Moments`]).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Filter {
     /// At the pixel's centre: colours through their mips, normals and roughness as they are there.
@@ -62,36 +63,97 @@ pub enum Filter {
     Naive,
     /// Normals averaged over the pixel; the concentration is the map's mean.
     Fixed,
-    /// The mean concentration, reduced by the length of the mean normal (Toksvig 2005, "Mipmapping Normal Maps").
+    /// The mean concentration, reduced by the length of the mean normal (Toksvig 2005, "Mipmapping Normal Maps"); a material's
+    /// lobes count as one.
     Toksvig,
+    /// The same for each of a material's lobes.
+    ToksvigLobe,
+    /// Mean and covariance of slopes (Olano and Baker 2010, "LEAN Mapping"); a material's lobes count as one.
+    Lean,
+    /// The same for each of a material's lobes.
+    LeanLobe,
+    /// As [`Filter::Lean`], with the masking that follows from these moments (Dupuy et al. 2013).
+    Leadr,
     /// One von Mises-Fisher lobe of the pixel's mean vector (Xu et al. 2017).
     Vmf1,
+    /// One in each quadrant of directions about the surface's normal.
+    Vmf4,
+    /// One in each of eight cells of these directions.
+    Vmf8,
+    /// As many of these cells as the spread within them asks for.
+    Vmf,
 }
 
 impl Filter {
     /// All.
-    pub const ALL: [Self; 6] = [Self::Point, Self::Tk, Self::Naive, Self::Fixed, Self::Toksvig, Self::Vmf1];
+    pub const ALL: [Self; 13] = [
+        Self::Point,
+        Self::Tk,
+        Self::Naive,
+        Self::Fixed,
+        Self::Toksvig,
+        Self::ToksvigLobe,
+        Self::Lean,
+        Self::LeanLobe,
+        Self::Leadr,
+        Self::Vmf1,
+        Self::Vmf4,
+        Self::Vmf8,
+        Self::Vmf,
+    ];
 
     /// The name by which it is asked for.
     pub fn name(self) -> &'static str {
         match self {
             Self::Point => "point",
             Self::Tk => "tk",
-            Self::Naive | Self::Fixed | Self::Toksvig | Self::Vmf1 => self.stored().map_or("", |filter| filter.name()),
+            _ => self.stored().map_or("", distribution::Filter::name),
         }
     }
 
     /// What it stores in a map's texels, if it reads normals and roughness through their mips.
     pub fn stored(self) -> Option<distribution::Filter> {
+        use distribution::Filter as Stored;
         match self {
             Self::Point | Self::Tk => None,
-            Self::Naive => Some(distribution::Filter::Naive),
-            Self::Fixed => Some(distribution::Filter::Fixed),
-            Self::Toksvig => Some(distribution::Filter::Toksvig),
-            Self::Vmf1 => Some(distribution::Filter::Vmf1),
+            Self::Naive => Some(Stored::Naive),
+            Self::Fixed => Some(Stored::Fixed),
+            Self::Toksvig => Some(Stored::Toksvig),
+            Self::ToksvigLobe => Some(Stored::ToksvigLobe),
+            Self::Lean => Some(Stored::Lean),
+            Self::LeanLobe => Some(Stored::LeanLobe),
+            Self::Leadr => Some(Stored::Leadr),
+            Self::Vmf1 => Some(Stored::Vmf1),
+            Self::Vmf4 => Some(Stored::Vmf4),
+            Self::Vmf8 => Some(Stored::Vmf8),
+            Self::Vmf => Some(Stored::Vmf),
+        }
+    }
+
+    /// Whether it stores cells of directions beside lobes.
+    pub(crate) fn has_cells(self) -> bool {
+        matches!(self, Self::Vmf4 | Self::Vmf8 | Self::Vmf)
+    }
+
+    /// Layers of the image of a sample's lobes: one a lobe, two a Gaussian of slopes; none if it makes no lobes.
+    pub(crate) fn lobe_layers(self) -> u32 {
+        let lobes = MOST_BASE_LOBES as u32;
+        match self {
+            Self::Point | Self::Tk => 0,
+            Self::Naive | Self::Fixed | Self::ToksvigLobe => lobes,
+            Self::Toksvig | Self::Vmf1 => 1,
+            Self::Lean | Self::Leadr => 2,
+            Self::LeanLobe => 2 * lobes,
+            Self::Vmf4 => 4,
+            Self::Vmf8 => 8,
+            // One cell, its four parts and their eight, where it blends between them.
+            Self::Vmf => 13,
         }
     }
 }
+
+/// Lobes of a material that filters take apart.
+pub const MOST_BASE_LOBES: usize = 4;
 
 /// Where the G-buffer comes from.
 #[derive(Clone, Copy, Debug, Default)]
@@ -137,6 +199,8 @@ pub struct Config {
     pub eps: f64,
     /// How materials are read.
     pub filter: Filter,
+    /// Most look-ups along the longer axis of what a pixel covers of a map, 1 to 16.
+    pub anisotropy: u32,
     /// Whether the mesh's curvature widens lobes as [`Filter::Tk`] does, whatever the filter.
     pub geometric: bool,
     /// Directions a shaded sample, 1 to 65536; at least 2 for [`Estimator::Mis`]. Where [`Rate::Bandwidth`] chooses among several
@@ -170,6 +234,7 @@ impl Config {
             combine: Combine::default(),
             eps: EPS,
             filter: Filter::default(),
+            anisotropy: 1,
             geometric: false,
             directions: 64,
             allocation: Allocation::default(),
@@ -248,6 +313,7 @@ impl Config {
             format!("{:?}", self.rate),
         )?;
         check((1..=256).contains(&self.probes), "probes", "1 to 256", self.probes.to_string())?;
+        check((1..=16).contains(&self.anisotropy), "anisotropy", "1 to 16", self.anisotropy.to_string())?;
         check((1e-3..=0.1).contains(&self.eps), "eps", "0.001 to 0.1", self.eps.to_string())?;
         let rate = self.samples_per_cycle.unwrap_or(1.0);
         check(rate > 0.0 && rate.is_finite(), "samples_per_cycle", "a finite number > 0", rate.to_string())?;

@@ -7,6 +7,7 @@ use crate::gpu::context::Context;
 use crate::gpu::image::Image;
 use crate::gpu::pipeline::BridgeSets;
 use crate::gpu::recorder::Recorder;
+use crate::pass::maps::MomentArrays;
 use crate::renderer::Renderer;
 use ash::vk;
 
@@ -52,8 +53,8 @@ impl Renderer {
         self.states.forget(buffer.handle);
     }
 
-    /// The array of a material's moments and its layer there.
-    pub(crate) fn moments(&self, material: usize) -> Option<(&Image, u32)> {
+    /// The arrays of a material's moments and of its cells, and its layers there.
+    pub(crate) fn moments(&self, material: usize) -> Option<MomentArrays<'_>> {
         self.materials.as_ref()?.0.maps.moments(material)
     }
 

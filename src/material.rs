@@ -1,10 +1,12 @@
 //! A reflectance and the textures that vary it over a surface; the f64 twin of looking them up.
 
+use crate::distribution::Surface;
+use crate::distribution::surface::FoundLobes;
 use crate::error::{Error, Result};
 use crate::frequency::wavelet::Grid;
 use crate::frequency::{TextureBandwidth, TextureCells};
 use crate::moments::Moments;
-use crate::reflectance::half_row::Rows;
+use crate::reflectance::half_row::{self, Rows};
 use crate::reflectance::{BlinnPhong, Ggx, LobeBandwidth, Model, Reflectance};
 use crate::texture::{Format, Texture};
 use glam::{DVec2, DVec3};
@@ -79,7 +81,7 @@ impl From<Model> for Material {
 }
 
 /// What the maps say at a point.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct PointMaterial {
     /// Unit shading normal in the tangent frame.
     pub normal: DVec3,
@@ -92,6 +94,8 @@ pub struct PointMaterial {
     /// What is added to the square of alpha, that is to 2 / concentration of every lobe: how far the normal turns within the
     /// pixel. Tables have no such parameter and stay as they are.
     pub kernel: f64,
+    /// In the place of the model's own lobes, where a filter finds some.
+    pub lobes: Option<Arc<FoundLobes>>,
 }
 
 /// The variance of a pixel filter, and the most that is added to the square of alpha (Tokuyoshi and Kaplanyan 2021, "Stable
@@ -161,13 +165,16 @@ impl Material {
     }
 
     /// What the maps hold at `uv`, where a pixel has the extent `footprint`: the derivatives of `uv` by its x and y, before
-    /// tiling. Colours come through their mips at the level that hardware chooses without anisotropy; normals and roughness
-    /// from level 0.
-    pub fn at(&self, uv: DVec2, footprint: [DVec2; 2]) -> PointMaterial {
+    /// tiling. Colours come through their mips, by at most `anisotropy` look-ups along the longer derivative; normals and
+    /// roughness from level 0.
+    pub fn at(&self, uv: DVec2, footprint: [DVec2; 2], anisotropy: u32) -> PointMaterial {
         let Maps { albedo, specular, normal, roughness, tiling } = &self.maps;
         let tiling = DVec2::from(tiling.map(f64::from));
         let place = uv * tiling;
-        let colour = |map: &Arc<Texture>| map.sample(place, lod(footprint.map(|d| d * tiling), map.size())).truncate();
+        let colour = |map: &Arc<Texture>| {
+            let reach = Reach::of(footprint.map(|d| d * tiling), map.size(), anisotropy);
+            reach.places(place).map(|at| map.sample(at, reach.lod).truncate()).sum::<DVec3>() / f64::from(reach.taps)
+        };
         let without = if matches!(self.model, Model::Vmf(_)) { DVec3::ZERO } else { DVec3::ONE };
         PointMaterial {
             normal: normal.as_ref().map_or(DVec3::Z, |map| unit(map.sample(place, 0.0).truncate().truncate())),
@@ -175,26 +182,45 @@ impl Material {
             specular: specular.as_ref().map_or(DVec3::ONE, colour),
             roughness: roughness.as_ref().map(|(map, kind)| self.model.roughness_from(*kind, map.sample(place, 0.0).x)),
             kernel: 0.0,
+            lobes: None,
         }
     }
 
-    /// The same under the filter that `moments` belong to: normals and roughness come from these, at the level of their mips that
-    /// colours would be read at.
-    pub fn filtered_at(&self, moments: Option<&Moments>, uv: DVec2, footprint: [DVec2; 2]) -> PointMaterial {
-        let point = self.at(uv, footprint);
+    /// The same under the filter that `moments` belong to: normals and roughness come from these, as colours do.
+    pub fn filtered_at(&self, moments: Option<&Moments>, uv: DVec2, footprint: [DVec2; 2], anisotropy: u32) -> PointMaterial {
+        let point = self.at(uv, footprint, anisotropy);
         let Some(moments) = moments else { return point };
         let tiling = DVec2::from(self.maps.tiling.map(f64::from));
-        let lod = lod(footprint.map(|d| d * tiling), moments.filtered().size(0));
-        let (normal, own) = moments.at(&self.model, uv * tiling, lod);
-        PointMaterial { normal, roughness: own.or(point.roughness), ..point }
+        let found = moments.at(uv * tiling, &Reach::of(footprint.map(|d| d * tiling), moments.size(), anisotropy));
+        let normal = found.normal;
+        let lobes = (found.lobes.count() > 0).then(|| Arc::new(found));
+        PointMaterial { normal, lobes, ..point }
     }
 }
 
-/// The level whose texels are as large as the longer of the derivatives `footprint` of a texture's coordinates; at least 0.
-fn lod(footprint: [DVec2; 2], size: [u32; 2]) -> f64 {
-    let size = DVec2::from(size.map(f64::from));
-    let [x, y] = footprint.map(|d| (d * size).length());
-    x.max(y).max(1.0).log2()
+/// What a pixel covers of a map: look-ups along its longer axis, at the level whose texels are as large as the step from one to
+/// the next; with one look-up, as large as the longer axis. Twin of `Reach` in `glsl/filter.comp`.
+pub(crate) struct Reach {
+    axis: DVec2,
+    pub taps: u32,
+    pub lod: f64,
+}
+
+impl Reach {
+    /// Of the derivatives `footprint` of a texture's coordinates, with at most `anisotropy` look-ups.
+    pub fn of(footprint: [DVec2; 2], size: [u32; 2], anisotropy: u32) -> Self {
+        let size = DVec2::from(size.map(f64::from));
+        let [x, y] = footprint.map(|d| (d * size).length());
+        let (major, minor) = (x.max(y).max(1.0), x.min(y).max(1.0));
+        let taps = (major / minor - 1e-3).ceil().clamp(1.0, f64::from(anisotropy));
+        Self { axis: footprint[usize::from(y >= x)], taps: taps as u32, lod: (major / taps).max(1.0).log2() }
+    }
+
+    /// Where the look-ups are taken about `uv`.
+    pub fn places(&self, uv: DVec2) -> impl Iterator<Item = DVec2> {
+        let (axis, taps) = (self.axis, f64::from(self.taps));
+        (0..self.taps).map(move |i| uv + axis * ((f64::from(i) + 0.5) / taps - 0.5))
+    }
 }
 
 /// The unit vector over x and y that faces up.
@@ -222,10 +248,22 @@ impl PointMaterial {
     /// `model` as the maps make it. Albedos and reflectances at normal incidence are clamped to 1 where the model's are at most
     /// that.
     pub fn reflectance(&self, model: &Model) -> PointReflectance {
-        let plain = |model| PointReflectance { model, scale: DVec3::ONE, base: DVec3::ZERO };
+        let plain = |model| PointReflectance { model, scale: DVec3::ONE, base: DVec3::ZERO, surface: None };
         let at_most_one = |c: DVec3| c.clamp(DVec3::ZERO, DVec3::ONE);
         let albedo = |c: DVec3| at_most_one(c * self.albedo);
         let specular = |c: DVec3| at_most_one(c * self.specular);
+        if let Some(found) = &self.lobes {
+            let coloured = match model {
+                Model::Ggx(g) => Model::Ggx(Ggx { f0: specular(g.f0), albedo: albedo(g.albedo), ..*g }),
+                Model::BlinnPhong(b) => {
+                    Model::BlinnPhong(BlinnPhong { specular: specular(b.specular), albedo: albedo(b.albedo), ..*b })
+                }
+                other => other.clone(),
+            };
+            let found = found.as_ref().clone().widened(self.kernel);
+            let surface = Surface::new(coloured.clone(), &found, self.specular, albedo(DVec3::ONE));
+            return PointReflectance { surface: Some(surface), ..plain(coloured) };
+        }
         match model {
             Model::Ggx(g) => {
                 let alpha = self.roughness.unwrap_or(g.alpha);
@@ -246,18 +284,20 @@ impl PointMaterial {
                 },
                 scale: self.specular,
                 base: albedo(DVec3::ONE),
+                surface: None,
             },
             Model::Table(_) | Model::Turned(_) => PointReflectance { scale: self.albedo, ..plain(model.clone()) },
         }
     }
 }
 
-/// A reflectance at one point of a surface: a model, scaled, over a diffuse base.
+/// A reflectance at one point of a surface: a model, scaled, over a diffuse base; or what a filter found of it.
 #[derive(Clone, Debug)]
 pub struct PointReflectance {
     model: Model,
     scale: DVec3,
     base: DVec3,
+    surface: Option<Surface>,
 }
 
 impl PointReflectance {
@@ -269,18 +309,27 @@ impl PointReflectance {
 
 impl Reflectance for PointReflectance {
     fn evaluate(&self, wi: DVec3, wo: DVec3) -> DVec3 {
-        self.with(wi, wo, self.model.evaluate(wi, wo))
+        match &self.surface {
+            Some(surface) => surface.evaluate(wi, wo),
+            None => self.with(wi, wo, self.model.evaluate(wi, wo)),
+        }
     }
 
     fn isotropic(&self) -> bool {
-        self.model.isotropic()
+        self.surface.is_none() && self.model.isotropic()
     }
 
     fn mean_over_turns(&self, wi: DVec3, wo: DVec3) -> DVec3 {
-        self.with(wi, wo, self.model.mean_over_turns(wi, wo))
+        match &self.surface {
+            Some(surface) => surface.mean_over_turns(wi, wo),
+            None => self.with(wi, wo, self.model.mean_over_turns(wi, wo)),
+        }
     }
 
     fn rows(&self, weights: DVec3) -> Rows<'_> {
+        if self.surface.is_some() {
+            return half_row::one_by_one(self, weights);
+        }
         let (model, base) = (self.model.rows(weights * self.scale), weights.dot(self.base) / PI);
         Box::new(move |row, out| {
             model(row, out);

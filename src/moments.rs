@@ -1,33 +1,63 @@
 //! What the filters that read through mips make of a material's normals and roughness, in f64: twin of the passes `brdf_map` and
 //! `vmf_mips` and of what `filter` decodes.
 
-use crate::config::Filter;
-use crate::distribution::effective::Rule;
-use crate::distribution::{BrdfMap, Filtered, Mixture, vmf};
-use crate::material::{LEAST_ALPHA, MOST_CONCENTRATION, Maps, Material, unit};
-use crate::reflectance::{Ggx, Model};
+use crate::config::{Filter, MOST_BASE_LOBES};
+use crate::distribution::effective::{self, Rule};
+use crate::distribution::surface::FoundLobes;
+use crate::distribution::{BrdfMap, Filtered, Mixture};
+use crate::material::{LEAST_ALPHA, Maps, Material, Reach};
+use crate::reflectance::{Ggx, Lobe, Model};
 use crate::texture::Texture;
 use glam::{DVec2, DVec3};
 use std::sync::Arc;
 
-/// What of a material's lobes is filtered.
+/// The lobes of a model that filters take apart, of weights that sum to 1.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct BaseLobes {
+    all: [Lobe; MOST_BASE_LOBES],
+    count: usize,
+}
+
+impl BaseLobes {
+    /// `None` for tables, which have none of their own, and for more lobes than are taken apart.
+    pub fn of(model: &Model) -> Option<Self> {
+        let least = |ggx: &Ggx| Model::Ggx(Ggx { alpha: ggx.alpha.max(LEAST_ALPHA), ..*ggx });
+        let lobes = match model {
+            Model::Ggx(ggx) => effective::base(&least(ggx), None, Rule::Exact)?,
+            other => effective::base(other, None, Rule::Exact)?,
+        };
+        let none = Lobe { mu: DVec3::Z, kappa: 0.0, weight: 0.0 };
+        let mut all = [none; MOST_BASE_LOBES];
+        all.get_mut(..lobes.len())?.copy_from_slice(&lobes);
+        Some(Self { all, count: lobes.len() })
+    }
+
+    /// They.
+    pub fn lobes(&self) -> &[Lobe] {
+        self.all.get(..self.count).unwrap_or_default()
+    }
+
+    /// Whether all are about the normal: each is a facet then.
+    pub fn upright(&self) -> bool {
+        self.lobes().iter().all(|lobe| lobe.mu.z > 1.0 - 1e-6)
+    }
+}
+
+/// What of a material is filtered.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Base {
-    /// One lobe about the normal, of this spread where there is no map of roughness.
-    Lobe {
-        /// [`vmf::spread`].
-        spread: f64,
-    },
-    /// Normals only: lobes that one parameter does not describe stay as they are.
+    /// Lobes under its normals and its roughness.
+    Lobes(BaseLobes),
+    /// Normals only: its lobes stay as they are.
     Normals,
 }
 
-/// How one lobe's concentration becomes alpha.
+/// What a concentration is of.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Parameter {
-    /// sqrt(2 / concentration).
+    /// A lobe of alpha sqrt(2 / concentration).
     Alpha,
-    /// That of a cosine power, whose mean cosine is exact: sqrt(2 spread).
+    /// A cosine power, whose mean cosine is exact, of alpha sqrt(2 spread).
     Exponent,
 }
 
@@ -35,42 +65,50 @@ impl Base {
     /// Of a material that has something to filter.
     pub fn of(material: &Material) -> Option<Self> {
         let maps = &material.maps;
-        let base = match &material.model {
-            Model::Ggx(ggx) => Self::Lobe { spread: vmf::spread(2.0 / ggx.alpha.max(LEAST_ALPHA).powi(2)) },
-            Model::BlinnPhong(blinn_phong) => Self::Lobe { spread: 1.0 / (blinn_phong.exponent + 2.0) },
-            Model::Vmf(mixture) => match mixture.lobes() {
-                [lobe] if lobe.mu.z > 1.0 - 1e-9 => Self::Lobe { spread: vmf::spread(lobe.kappa) },
-                _ => Self::Normals,
-            },
-            Model::Table(_) | Model::Turned(_) => Self::Normals,
-        };
+        let base = BaseLobes::of(&material.model).map_or(Self::Normals, Self::Lobes);
         (maps.normal.is_some() || base != Self::Normals && maps.roughness.is_some()).then_some(base)
     }
 
+    /// The lobes that are filtered; none if they stay.
+    pub fn lobes(&self) -> &[Lobe] {
+        match self {
+            Self::Lobes(base) => base.lobes(),
+            Self::Normals => &[],
+        }
+    }
+
+    /// Whether a mean normal is stored beside lobes that are not about it.
+    pub fn upright(&self) -> bool {
+        matches!(self, Self::Lobes(base) if base.upright())
+    }
+
     /// The map of roughness that counts.
-    pub fn roughness(self, material: &Material) -> Option<&Arc<Texture>> {
-        material.maps.roughness.as_ref().filter(|_| self != Self::Normals).map(|(map, _)| map)
+    pub fn roughness<'a>(&self, material: &'a Material) -> Option<&'a Arc<Texture>> {
+        material.maps.roughness.as_ref().filter(|_| *self != Self::Normals).map(|(map, _)| map)
     }
 
     /// Texels of the map of moments: as many a side as the finer map has.
-    pub fn size(self, material: &Material) -> [u32; 2] {
+    pub fn size(&self, material: &Material) -> [u32; 2] {
         let maps = [material.maps.normal.as_ref(), self.roughness(material)];
         maps.into_iter().flatten().fold([1, 1], |[w, h], map| [w.max(map.size()[0]), h.max(map.size()[1])])
     }
 }
 
 impl Parameter {
-    /// Of a model with one lobe.
+    /// Of a model's lobes.
     pub fn of(model: &Model) -> Self {
         if matches!(model, Model::BlinnPhong(_)) { Self::Exponent } else { Self::Alpha }
     }
 }
 
-/// The lobe at each place of a material, at each scale.
+/// The lobes at each place of a material, at each scale.
 #[derive(Clone, Debug)]
 pub struct Moments {
-    filtered: Filtered<'static>,
-    base: Base,
+    filter: crate::distribution::Filter,
+    lobes: Option<Filtered<'static>>,
+    /// The mean normal, where lobes are not about it.
+    normals: Option<Filtered<'static>>,
+    size: [u32; 2],
 }
 
 impl Moments {
@@ -78,50 +116,64 @@ impl Moments {
     /// a map to filter.
     pub fn of(material: &Material, filter: Filter) -> Option<Self> {
         let (filter, base) = (filter.stored()?, Base::of(material)?);
-        let sharp = || {
+        let size = base.size(material);
+        let keep =
+            |material: &Material, filter| Some(Filtered::keeping(filter, BrdfMap::of(material, size, Rule::Exact).ok()?, false));
+        let lobes = if base == Base::Normals { None } else { Some(keep(material, filter)?) };
+        let normals = if base.upright() {
+            None
+        } else {
             let model = Model::Ggx(Ggx { alpha: LEAST_ALPHA, f0: DVec3::ONE, albedo: DVec3::ZERO });
-            Material::new(model, Maps { normal: material.maps.normal.clone(), ..Maps::default() })
+            let maps = Maps { normal: material.maps.normal.clone(), ..Maps::default() };
+            Some(keep(&Material::new(model, maps), crate::distribution::Filter::Naive)?)
         };
-        let map = match base {
-            Base::Lobe { .. } => BrdfMap::of(material, base.size(material), Rule::Exact),
-            Base::Normals => BrdfMap::of(&sharp(), base.size(material), Rule::Exact),
-        };
-        Some(Self { filtered: Filtered::keeping(filter, map.ok()?, false), base })
+        Some(Self { filter, lobes, normals, size })
     }
 
-    /// What is stored, with its mips.
-    pub fn filtered(&self) -> &Filtered<'static> {
-        &self.filtered
+    /// What is stored of the lobes, with its mips; `None` if the material's stay as they are.
+    pub fn lobes(&self) -> Option<&Filtered<'static>> {
+        self.lobes.as_ref()
     }
 
-    /// The shading normal, and the model's own parameter unless its lobes stay as they are, at `place` on the maps and a level
-    /// of theirs.
-    pub(crate) fn at(&self, model: &Model, place: DVec2, lod: f64) -> (DVec3, Option<f64>) {
-        let Mixture::Vmf(lobes) = self.filtered.decode(&self.filtered.sample(place, lod)) else { return (DVec3::Z, None) };
-        let Some(lobe) = lobes.first() else { return (DVec3::Z, None) };
-        let own = match model {
-            Model::Ggx(_) => (2.0 / lobe.kappa).sqrt().clamp(LEAST_ALPHA, 1.0),
-            Model::BlinnPhong(_) => (1.0 / vmf::spread(lobe.kappa) - 2.0).clamp(0.0, MOST_CONCENTRATION),
-            _ => lobe.kappa.clamp(0.0, MOST_CONCENTRATION),
+    /// What is stored of the mean normal, if lobes are not about it.
+    pub fn normals(&self) -> Option<&Filtered<'static>> {
+        self.normals.as_ref()
+    }
+
+    /// Texels of the map.
+    pub fn size(&self) -> [u32; 2] {
+        self.size
+    }
+
+    /// What is found of a material at places on the maps, averaged: no lobes if these stay as they are.
+    pub(crate) fn at(&self, uv: DVec2, reach: &Reach) -> FoundLobes {
+        let mean = |map: &Filtered<'_>| {
+            let mut sum: Vec<f64> = Vec::new();
+            for place in reach.places(uv) {
+                let at = map.sample(place, reach.lod);
+                sum.resize(at.len(), 0.0);
+                sum.iter_mut().zip(at).for_each(|(s, v)| *s += v / f64::from(reach.taps));
+            }
+            sum
         };
-        (lobe.mu, (self.base != Base::Normals).then_some(own))
+        let direction = |map: &Filtered<'_>, texel: &[f64]| map.mean_vector(texel).try_normalize().unwrap_or(DVec3::Z);
+        let of_normals = || self.normals.as_ref().map(|map| direction(map, &mean(map)));
+        let (upright, masking) = (self.normals.is_none(), self.filter.masking());
+        let Some(map) = &self.lobes else {
+            return FoundLobes { normal: of_normals().unwrap_or(DVec3::Z), lobes: Mixture::Vmf(Vec::new()), upright, masking };
+        };
+        let texel = mean(map);
+        let lobes = map.decode(&texel);
+        let own = || direction(map, &texel);
+        let normal = if matches!(lobes, Mixture::Slopes(_)) { DVec3::Z } else { of_normals().unwrap_or_else(own) };
+        FoundLobes { normal, lobes, upright, masking }
     }
-}
-
-/// About the most that normals add to the square of alpha under a filter that widens lobes: twice what all of the map's
-/// together add, as a part of them may spread more; at most 1.
-pub(crate) fn most_added(material: &Material, filter: Filter) -> f64 {
-    let widens = matches!(filter, Filter::Toksvig | Filter::Vmf1) && matches!(Base::of(material), Some(Base::Lobe { .. }));
-    let Some(map) = material.maps.normal.as_ref().filter(|_| widens) else { return 0.0 };
-    let sum: DVec3 = map.texels().map(|texel| unit(texel.truncate().truncate())).sum();
-    let mean = sum / map.texels().count().max(1) as f64;
-    // Alpha squared is twice the spread.
-    (4.0 * (1.0 - mean.length())).clamp(0.0, 1.0)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::distribution::vmf;
     use crate::material::Roughness;
     use crate::reflectance::{BlinnPhong, MerlTable, Vmf};
 
@@ -134,50 +186,62 @@ mod tests {
         Maps { normal: Some(Arc::new(normal)), ..Maps::default() }
     }
 
+    fn found(material: &Material, filter: Filter, footprint: [DVec2; 2]) -> FoundLobes {
+        let moments = Moments::of(material, filter).unwrap();
+        moments.at(DVec2::new(0.25, 0.5), &Reach::of(footprint, moments.size(), 1))
+    }
+
     #[test]
     fn normals_widen_a_lobe_by_their_spread() {
         let blinn_phong = Model::BlinnPhong(BlinnPhong { exponent: 98.0, specular: DVec3::ONE, albedo: DVec3::ZERO });
         let ggx = Model::Ggx(Ggx { alpha: 0.1, f0: DVec3::ONE, albedo: DVec3::ZERO });
-        let one = Model::Vmf(Arc::new(Vmf::new(&[vmf::Lobe { mu: DVec3::Z, kappa: 200.0, weight: 1.0 }]).unwrap()));
-        for (model, own, spread) in [(blinn_phong, 98.0, 0.01), (ggx, 0.1, vmf::spread(200.0)), (one, 200.0, vmf::spread(200.0))]
-        {
-            let material = Material::new(model.clone(), maps([0.3, -0.3]));
-            let moments = Moments::of(&material, Filter::Vmf1).unwrap();
-            let near = material.filtered_at(Some(&moments), DVec2::new(0.25, 0.5), [DVec2::ZERO; 2]);
+        let one = Model::Vmf(Arc::new(Vmf::new(&[Lobe { mu: DVec3::Z, kappa: 200.0, weight: 0.4 }]).unwrap()));
+        for (model, spread) in [(blinn_phong, 0.01), (ggx, vmf::spread(200.0)), (one, vmf::spread(200.0))] {
+            let material = Material::new(model, maps([0.3, -0.3]));
+            let near = found(&material, Filter::Vmf1, [DVec2::ZERO; 2]);
+            let Mixture::Vmf(lobes) = &near.lobes else { panic!("{near:?}") };
             // Normals are stored in 16 bits.
-            assert!((near.normal.x - 0.3).abs() < 1e-3 && (near.roughness.unwrap() / own - 1.0).abs() < 1e-5, "{near:?}");
-            let far = material.filtered_at(Some(&moments), DVec2::new(0.25, 0.5), [DVec2::X, DVec2::Y]);
+            assert!((near.normal.x - 0.3).abs() < 1e-3 && (vmf::spread(lobes[0].kappa) / spread - 1.0).abs() < 1e-5, "{near:?}");
+            let far = found(&material, Filter::Vmf1, [DVec2::X, DVec2::Y]);
+            let Mixture::Vmf(lobes) = &far.lobes else { panic!("{far:?}") };
             let length = (1.0 - spread) * (1.0f64 - 0.09).sqrt();
-            let (kappa, parameter) = (vmf::concentration(1.0 - length), far.roughness.unwrap());
-            let expected = match &model {
-                Model::Ggx(_) => (2.0 / kappa).sqrt(),
-                Model::BlinnPhong(_) => 1.0 / (1.0 - length) - 2.0,
-                _ => kappa,
-            };
-            assert!((parameter / expected - 1.0).abs() < 2e-3 && far.normal.z > 0.999_999, "{parameter} for {expected}");
-            // Both normals together add 0.093 to alpha squared.
-            assert!((most_added(&material, Filter::Vmf1) - 4.0 * (1.0 - 0.91f64.sqrt())).abs() < 1e-3);
-            assert_eq!(most_added(&material, Filter::Naive), 0.0);
-            assert!(most_added(&Material::new(model, maps([0.3, 0.3])), Filter::Toksvig) < 1e-5);
+            assert!((vmf::mean_cosine(lobes[0].kappa) / length - 1.0).abs() < 2e-3 && far.normal.z > 0.999_999, "{far:?}");
+            assert!(far.upright && lobes.len() == 1 && (lobes[0].weight - 1.0).abs() < 1e-12);
+            // The two normals are in cells of their own.
+            let apart = found(&material, Filter::Vmf4, [DVec2::X, DVec2::Y]);
+            let Mixture::Vmf(lobes) = &apart.lobes else { panic!("{apart:?}") };
+            assert!(lobes.len() == 2 && lobes.iter().all(|l| (vmf::spread(l.kappa) / spread - 1.0).abs() < 1e-5), "{apart:?}");
         }
     }
 
     #[test]
-    fn tables_and_mixtures_keep_their_lobes() {
-        let lobe = |x: f64| vmf::Lobe { mu: DVec3::new(x, 0.0, 1.0).normalize(), kappa: 40.0, weight: 0.5 };
-        let mixture = Model::Vmf(Arc::new(Vmf::new(&[lobe(0.4), lobe(-0.4)]).unwrap()));
-        let off = Model::Vmf(Arc::new(Vmf::new(&[lobe(0.4)]).unwrap()));
+    fn tables_and_large_mixtures_keep_their_lobes() {
+        let lobe = |x: f64| Lobe { mu: DVec3::new(x, 0.0, 1.0).normalize(), kappa: 40.0, weight: 0.2 };
+        let mixture = Model::Vmf(Arc::new(Vmf::new(&[-0.4, -0.2, 0.0, 0.2, 0.4].map(lobe)).unwrap()));
         let table = Model::Table(Arc::new(MerlTable::from_fn(|_, _, _| DVec3::ONE)));
-        for model in [mixture, off, table] {
+        for model in [mixture, table] {
             let material = Material::new(model.clone(), maps([0.5, -0.3]));
-            let moments = Moments::of(&material, Filter::Vmf1).unwrap();
-            let far = material.filtered_at(Some(&moments), DVec2::ZERO, [DVec2::X, DVec2::Y]);
+            let far = found(&material, Filter::Vmf8, [DVec2::X, DVec2::Y]);
             let mean = DVec2::new(0.2, 0.75f64.sqrt() + 0.91f64.sqrt()).normalize();
-            assert!((far.normal.x - mean.x).abs() < 1e-3 && far.roughness.is_none(), "{far:?}");
+            assert!((far.normal.x - mean.x).abs() < 1e-3 && far.lobes.count() == 0, "{far:?}");
             let rough = Texture::scalar([1, 1], &[0.5]).unwrap();
             let rough = Maps { roughness: Some((Arc::new(rough), Roughness::Alpha)), ..Maps::default() };
             assert!(Moments::of(&Material::new(model, rough), Filter::Vmf1).is_none());
             assert!(Moments::of(&material, Filter::Tk).is_none());
+        }
+    }
+
+    #[test]
+    fn lobes_about_other_directions_have_a_mean_normal_beside_them() {
+        let lobe = |x: f64| Lobe { mu: DVec3::new(x, 0.0, 1.0).normalize(), kappa: 40.0, weight: 0.5 };
+        let cloth = Model::Vmf(Arc::new(Vmf::new(&[1.0, -1.0].map(lobe)).unwrap()));
+        let material = Material::new(cloth, maps([0.2, 0.2]));
+        for (filter, count) in
+            [(Filter::Vmf1, 1), (Filter::Toksvig, 1), (Filter::ToksvigLobe, 2), (Filter::Vmf4, 2), (Filter::Vmf, 2)]
+        {
+            let far = found(&material, filter, [DVec2::X, DVec2::Y]);
+            assert!(!far.upright && far.lobes.count() == count, "{far:?}");
+            assert!((far.normal.x - 0.2).abs() < 1e-3 && (far.lobes.weight() - 1.0).abs() < 1e-9, "{far:?}");
         }
     }
 }

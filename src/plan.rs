@@ -16,6 +16,8 @@ pub(crate) struct Plan {
     pub gbuffer: Option<[ImageDesc; 5]>,
     pub normals: ImageDesc,
     pub factors: ImageDesc,
+    /// Layers for the lobes that the filter finds; one texel where it finds none.
+    pub lobes: ImageDesc,
     pub curvature: Option<ImageDesc>,
     pub levels: Levels,
     /// The level of each sample, where the renderer itself writes it.
@@ -135,6 +137,11 @@ impl Plan {
             }),
             normals: image("normals", vk::Format::R32G32B32A32_SFLOAT, shading, storage),
             factors: image("factors", vk::Format::R32G32B32A32_UINT, shading, storage),
+            lobes: {
+                let layers = config.filter.lobe_layers();
+                let extent = if layers > 0 { shading } else { [1, 1] };
+                ImageDesc { layers: Some(layers.max(1)), ..image("lobes", vk::Format::R32G32B32A32_SFLOAT, extent, storage) }
+            },
             curvature: config.curvature.then(|| image("curvature", vk::Format::R16G16B16A16_SFLOAT, shading, storage)),
             level: (levels.top > 0 && config.rate != Rate::Given)
                 .then(|| image("level", vk::Format::R32_UINT, shading, storage | vk::ImageUsageFlags::TRANSFER_DST)),
@@ -154,6 +161,7 @@ impl Plan {
         let values = self.level.iter().chain(&self.prediction).chain(&self.odd).chain([
             &self.normals,
             &self.factors,
+            &self.lobes,
             &self.radiance,
             &self.resolved,
         ]);
@@ -275,8 +283,8 @@ mod tests {
         assert_eq!(list(&memory_footprint(&base)), Some(4 * pixels));
         let fine = Config { samples_per_side: 4, ..base.clone() };
         assert_eq!(list(&memory_footprint(&fine)), Some(16 * 4 * pixels));
-        // surface, coordinate, derivative, normals, factors, radiance 16 bytes; ids, depth, list 4; resolved 16
-        assert_eq!(memory_footprint(&base).total(), pixels * (6 * 16 + 3 * 4 + 16) + 16 + 16 + 2 * (240 + 256 * 64));
+        // surface, coordinate, derivative, normals, factors, radiance 16 bytes; ids, depth, list 4; resolved 16; a texel of lobes
+        assert_eq!(memory_footprint(&base).total(), pixels * (6 * 16 + 3 * 4 + 16) + 16 + 16 + 16 + 2 * (240 + 256 * 64));
     }
 
     #[test]

@@ -156,8 +156,8 @@ impl Renderer {
         let bridge = BridgeSets { gbuffer, materials: self.bridge.write(rec, materials, samplers) };
 
         // 2  Their materials at the pixel's scale.
-        let (normals, factors) = (&targets.normals, &targets.factors);
-        filter.record(rec, &filter::Io { frame, bridge, samplers, maps: &materials.maps, normals, factors });
+        let (normals, factors, lobes) = (&targets.normals, &targets.factors, &targets.lobes);
+        filter.record(rec, &filter::Io { frame, bridge, samplers, maps: &materials.maps, normals, factors, lobes });
         if let (Some(pass), Some(curvature)) = (&passes.curvature, &targets.curvature) {
             pass.record(rec, &curvature::Io { frame, bridge, samplers, normals, curvature });
         }
@@ -252,6 +252,7 @@ impl Renderer {
                     samplers,
                     normals,
                     factors,
+                    lobes,
                     environment,
                     materials,
                     arguments,
@@ -269,7 +270,19 @@ impl Renderer {
             let light_count = exact + area;
             pass.record(
                 rec,
-                &base::Io { frame, bridge, samplers, normals, factors, prefiltered, materials, lights, light_count, radiance },
+                &base::Io {
+                    frame,
+                    bridge,
+                    samplers,
+                    normals,
+                    factors,
+                    lobes,
+                    prefiltered,
+                    materials,
+                    lights,
+                    light_count,
+                    radiance,
+                },
             );
         }
         if let (Some(pass), Some(buffers), Some(odd)) = (&passes.upsample, &targets.cells, &targets.odd) {

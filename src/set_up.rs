@@ -59,7 +59,8 @@ impl Renderer {
         memory: &mut dyn HostAllocator,
     ) -> Result<Retired> {
         let bridge = BridgeLayouts { gbuffer: layout(&self.passes.gbuffer, &self.config), materials: self.bridge.layout };
-        let (modules, slots, widened) = (&self.config.modules, self.config.frames_in_flight, self.config.widened());
+        let config = &self.config;
+        let (modules, slots, widened) = (&config.modules, config.frames_in_flight, config.widened());
         let (filter, passes, samplers) = (self.config.filter, self.passes.moments.as_ref(), &self.samplers);
         let eps = (self.config.rate == Rate::Bandwidth).then_some(self.config.eps);
         if self.config.estimator == Estimator::Preconvolved {
@@ -68,7 +69,7 @@ impl Renderer {
         let (mut upload, filter) = Build::run(&self.cx, memory, |build| {
             let upload = MaterialsUpload::new(build, materials, &Reading { filter, widened, passes, samplers }, eps)?;
             let mut p = PassContext { build, modules, bridge, slots };
-            let filter = filter::Filter::new(&mut p, filter, upload.uses(), widened)?;
+            let filter = filter::Filter::new(&mut p, config, upload.uses())?;
             Ok((upload, filter))
         })?;
         let mut bag = Retired::default();

@@ -19,6 +19,8 @@ pub(crate) struct Targets {
     pub gbuffer: Option<GBufferImages>,
     pub normals: Image,
     pub factors: Image,
+    /// Of each sample, as `glsl/include/lobes.glsl` reads them.
+    pub lobes: Image,
     pub curvature: Option<Image>,
     /// The level of each sample, where the renderer itself writes it.
     pub level: Option<Image>,
@@ -80,6 +82,7 @@ impl Targets {
             gbuffer: plan.gbuffer.map(|images| GBufferImages::new(build, images)).transpose()?,
             normals: Image::new(build, plan.normals)?,
             factors: Image::new(build, plan.factors)?,
+            lobes: Image::new(build, plan.lobes)?,
             curvature: plan.curvature.map(|desc| Image::new(build, desc)).transpose()?,
             level: plan.level.map(|desc| Image::new(build, desc)).transpose()?,
             prediction: plan.prediction.map(|desc| Prediction::new(build, desc)).transpose()?,
@@ -107,7 +110,7 @@ impl Targets {
         let gbuffer = self.gbuffer.as_ref().map(GBufferImages::colors);
         let prediction = self.prediction.as_ref().map(|p| &p.image);
         let own = [&self.curvature, &self.level, &self.odd].into_iter().flatten().chain(prediction);
-        let always = [&self.normals, &self.factors, &self.radiance, &self.resolved];
+        let always = [&self.normals, &self.factors, &self.lobes, &self.radiance, &self.resolved];
         let all = gbuffer.into_iter().flatten().chain(own).chain(always);
         all.into_iter().find(|image| image.desc.name == name)
     }
@@ -132,7 +135,7 @@ impl Targets {
         let images = self.gbuffer.into_iter().flat_map(GBufferImages::into_images);
         let (prediction, predicted) = self.prediction.map(|p| (p.image, vec![p.forecast, p.blocks])).unzip();
         let own = [self.curvature, self.level, prediction, self.odd].into_iter().flatten();
-        for image in images.chain(own).chain([self.normals, self.factors, self.radiance, self.resolved]) {
+        for image in images.chain(own).chain([self.normals, self.factors, self.lobes, self.radiance, self.resolved]) {
             states.forget(image.handle);
             image.retire(bag);
         }

@@ -92,7 +92,7 @@ fn widened_lobes_are_right() {
             let (mut sum, mut expected) = (DVec3::ZERO, DVec3::ZERO);
             for (i, hit) in reference.hits().iter().enumerate().filter(|(i, _)| i % 7 == 0) {
                 let Some(hit) = hit.as_ref().filter(|h| h.normal.dot(h.view) > 0.3) else { continue };
-                let mut hit = *hit;
+                let mut hit = hit.clone();
                 hit.point.kernel = kernels[i];
                 assert!(kernels[i] > 1e-4);
                 sum += image.radiance(i);

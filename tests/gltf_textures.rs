@@ -54,7 +54,7 @@ fn shaded(world: &World, uv: DVec2) -> Ggx {
     let material = Material::new(m.model.clone(), m.maps.clone());
     material.validate().unwrap();
     let Model::Ggx(ggx) = material.model else { panic!("{:?}", material.model) };
-    let point = material.at(uv, [DVec2::ZERO; 2]);
+    let point = material.at(uv, [DVec2::ZERO; 2], 1);
     Ggx { alpha: point.roughness.unwrap_or(ggx.alpha), f0: ggx.f0 * point.specular, albedo: ggx.albedo * point.albedo }
 }
 

@@ -105,8 +105,9 @@ fn every_light_is_what_quadrature_finds() {
             let reference = Reference::new(&world, EXTENT, Options::default()).unwrap();
             let hits = reference.hits().to_vec();
             // Away from silhouettes, where a rasteriser and a ray caster may see different surfaces.
-            let inside = |i: &usize| hits[*i].is_some_and(|h| h.normal.dot(h.view) > 0.2);
-            let pixels: Vec<_> = (0..hits.len()).filter(inside).filter_map(|i| Some((i, reflected(&world, &hits[i]?)))).collect();
+            let inside = |i: &usize| hits[*i].as_ref().is_some_and(|h| h.normal.dot(h.view) > 0.2);
+            let pixels: Vec<_> =
+                (0..hits.len()).filter(inside).filter_map(|i| Some((i, reflected(&world, hits[i].as_ref()?)))).collect();
             assert!(pixels.len() > 500);
             for (estimator, bound) in [(Estimator::Mis, 3e-3), (Estimator::Brdf, 1e-2)] {
                 let mut stage = Stage::new(&world, &config(EXTENT, estimator, 2048));

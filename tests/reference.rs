@@ -195,7 +195,7 @@ fn broad_lobes_agree_with_brute_force() {
         for reflectance in [&Lambert as &dyn Reflectance, &metal] {
             let image = render(&world, reflectance, 16, Options::default());
             for i in some_pixels(&image, 8) {
-                let hit = image.hits[i].unwrap();
+                let hit = image.hits[i].as_ref().unwrap();
                 let truth = brute_force(&world, reflectance, hit.normal, hit.view, 8);
                 let off = relative(image.radiance[i], truth);
                 assert!(off < 1e-3, "pixel {i}, cosine {}: {} for {truth}: {off:e}", hit.normal.dot(hit.view), image.radiance[i]);
@@ -211,7 +211,7 @@ fn mirror_like_lobes_agree_with_a_half_vector_rule() {
     let image = render(&world, &metal, 32, Options::default());
     let mut checked = 0;
     for i in some_pixels(&image, 12) {
-        let hit = image.hits[i].unwrap();
+        let hit = image.hits[i].as_ref().unwrap();
         let [coarse, truth] = [500, 1000].map(|steps| half_vector_rule(&world, &metal, hit.normal, hit.view, steps));
         // At grazing views the horizon cuts the lobe and this rule converges slowly: what it does not know is no error.
         let unknown = relative(coarse, truth);
@@ -231,11 +231,11 @@ fn mirror_like_lobes_agree_with_brute_force() {
         let world = world(map);
         let metal = Metal { alpha: 0.03 };
         let image = render(&world, &metal, 32, Options::default());
-        let cosine = |i: usize| image.hits[i].map_or(0.0, |hit| hit.normal.dot(hit.view));
+        let cosine = |i: usize| image.hits[i].as_ref().map_or(0.0, |hit| hit.normal.dot(hit.view));
         // Grazing, oblique and frontal views: the first is where a mirror's lobe is narrowest.
         for range in [0.02..0.06, 0.2..0.4, 0.9..1.0] {
             let i = (0..image.hits.len()).find(|i| range.contains(&cosine(*i))).unwrap();
-            let hit = image.hits[i].unwrap();
+            let hit = image.hits[i].as_ref().unwrap();
             let off = relative(image.radiance[i], brute_force(&world, &metal, hit.normal, hit.view, 48));
             assert!(off < 1e-3, "pixel {i}, cosine {}: {off:e}", cosine(i));
         }
@@ -330,7 +330,7 @@ fn the_nearest_object_wins_and_steps_are_not_interior() {
     world.objects.push(Object { mesh: world.objects[0].mesh.clone(), transform: small, material: 0 });
     let image = render(&world, &Lambert, 64, Options { tolerance: 0.1, ..Options::default() });
     let interior = image.interior();
-    let object = |i: usize| image.hits[i].map(|h| h.object);
+    let object = |i: usize| image.hits[i].as_ref().map(|h| h.object);
     assert_eq!(object(32 * 64 + 32), Some(1));
     assert!((0..64 * 64).any(|i| interior[i] && object(i) == Some(0)));
     assert!((0..64 * 63).all(|i| object(i) == object(i + 64) || (!interior[i] && !interior[i + 64])));

@@ -1,20 +1,53 @@
-// What a texel keeps of the lobe under it, for filters with one lobe; its mips are averages (src/moments.rs is the f64 twin).
-//   vmf1:                  characteristic vector r of the lobe as x, y, 1 - z; the mean spread of the lobes below
-//   naive, fixed, toksvig: mean direction                  as x, y, 1 - z; the mean concentration
-// The weight of an undivided texel is 1 and not stored. The complement of z keeps what 32 bits can tell of a sharp lobe.
+// What a texel keeps of the lobes under it, in layers of four numbers; mips are averages (src/distribution/filter.rs is the f64
+// twin). Lobes are in the tangent frame, vectors are stored as x, y, 1 - z: the complement keeps what 32 bits can tell of a sharp
+// lobe.
+//   naive, fixed, toksvig, toksvig-lobe: mean direction; the mean concentration. toksvig merges lobes, the others keep them apart
+//   lean, leadr; lean-lobe:              mean slope, mean products xx and yy; mean product xy. lean-lobe keeps lobes apart
+//   vmf1:                                characteristic vector of all lobes; their mean spread
+//   vmf4, vmf8, vmf:                     of a base texel each lobe as vmf1 has it; from level 1 on, in images of half the size,
+//                                        of each cell weight times characteristic vector (w x, w y, w - w z) and weight w, and
+//                                        for vmf weight times spread, four cells in a layer
+// Lobes kept apart have the weights that they have everywhere. In front, if lobes are not about the normal: the mean normal.
 #ifndef MOMENTS_GLSL
 #define MOMENTS_GLSL
 #include "vmf.glsl"
 
+// In the order of src/distribution/filter.rs.
 const uint FILTER_NAIVE = 0u;
 const uint FILTER_FIXED = 1u;
 const uint FILTER_TOKSVIG = 2u;
-const uint FILTER_VMF1 = 3u;
+const uint FILTER_TOKSVIG_LOBE = 3u;
+const uint FILTER_LEAN = 4u;
+const uint FILTER_LEAN_LOBE = 5u;
+const uint FILTER_LEADR = 6u;
+const uint FILTER_VMF1 = 7u;
+const uint FILTER_VMF4 = 8u;
+const uint FILTER_VMF8 = 9u;
+const uint FILTER_VMF = 10u;
 
-// What a lobe's concentration becomes.
+// What a concentration is of.
 const uint LOBES_STAY = 0u;     // nothing: the material's own lobes stay
-const uint LOBES_ALPHA = 1u;    // sqrt(2 / concentration)
-const uint LOBES_EXPONENT = 2u; // alpha of a cosine power, whose mean cosine is exact: sqrt(2 spread)
+const uint LOBES_ALPHA = 1u;    // a lobe: alpha is sqrt(2 / concentration)
+const uint LOBES_EXPONENT = 2u; // a cosine power, whose mean cosine is exact: alpha is sqrt(2 spread)
+
+const uint MOST_BASE_LOBES = 4u; // of a material, that are filtered
+const uint CELLS = 8u;
+
+// Lobes of less weight are none.
+const float LEAST_WEIGHT = 1e-6;
+
+bool filter_of_slopes(uint filtering) {
+    return filtering == FILTER_LEAN || filtering == FILTER_LEAN_LOBE || filtering == FILTER_LEADR;
+}
+
+bool filter_of_cells(uint filtering) {
+    return filtering == FILTER_VMF4 || filtering == FILTER_VMF8 || filtering == FILTER_VMF;
+}
+
+// Whether lobes that are not of one direction are merged.
+bool filter_merges(uint filtering) {
+    return filtering == FILTER_TOKSVIG || filtering == FILTER_LEAN || filtering == FILTER_LEADR || filtering == FILTER_VMF1;
+}
 
 // Less spread than this beyond what is known comes of rounding.
 const float MOMENTS_ROUNDING = 2.0 * VMF_LEAST_SPREAD;
@@ -26,21 +59,55 @@ float moments_spread(vec3 r, float known) {
     return spread > known + MOMENTS_ROUNDING ? spread : known;
 }
 
-// Alpha of the lobe that a filter finds in moments.
-float moments_alpha(uint filtering, vec4 moments, uint lobes) {
-    float spread, kappa;
+// The direction of a vector that is stored as x, y, 1 - z.
+vec3 moments_direction(vec3 r) {
+    vec3 v = vec3(r.xy, 1.0 - r.z);
+    float square = dot(v, v);
+    return square > 0.0 ? v * inversesqrt(square) : vec3(0.0, 0.0, 1.0);
+}
+
+// The concentration of the lobe that a filter with lobes of directions finds in moments.
+float moments_concentration(uint filtering, vec4 moments) {
     if (filtering == FILTER_VMF1) {
-        spread = moments_spread(moments.xyz, moments.w);
-        kappa = vmf_concentration(spread);
-    } else {
-        kappa = moments.w;
-        if (filtering == FILTER_TOKSVIG) {
-            float off = moments_spread(moments.xyz, 0.0);
-            kappa *= (1.0 - off) / (1.0 - off + kappa * off);
-        }
-        spread = vmf_spread(kappa);
+        return vmf_concentration(moments_spread(moments.xyz, moments.w));
     }
-    return sqrt(lobes == LOBES_EXPONENT ? 2.0 * spread : 2.0 / max(kappa, 1e-12));
+    float kappa = moments.w;
+    if (filtering == FILTER_TOKSVIG || filtering == FILTER_TOKSVIG_LOBE) {
+        float off = moments_spread(moments.xyz, 0.0);
+        kappa *= (1.0 - off) / (1.0 - off + kappa * off);
+    }
+    return kappa;
+}
+
+// Alpha of a lobe of this concentration.
+float moments_alpha(float kappa, uint lobes) {
+    return sqrt(lobes == LOBES_EXPONENT ? 2.0 * vmf_spread(kappa) : 2.0 / max(kappa, 1e-12));
+}
+
+// The cell of a direction: the quadrant about z, and of eight cells its half nearer to z or to the horizon
+// (src/distribution/partition.rs).
+uint moments_cell(uint cells, vec3 mu) {
+    uint quadrant = (mu.x < 0.0 ? 1u : 0u) + (mu.y < 0.0 ? 2u : 0u);
+    float z = max(mu.z, 0.0);
+    bool low = z * z < dot(mu.xy, mu.xy);
+    return cells == 4u ? quadrant : 2u * quadrant + (low ? 1u : 0u);
+}
+
+// Slopes (src/distribution/slope.rs).
+const float LEAST_SLOPE_COSINE = 0.08;
+const float LEAST_SLOPE_VARIANCE = 1e-7;
+const float LEAST_SLOPE_CONCENTRATION = 1e-2;
+
+vec2 slope_of(vec3 m) {
+    return -m.xy / max(m.z, LEAST_SLOPE_COSINE);
+}
+
+// Mean products xx, xy, yy of the slopes of a lobe about slope b, of its own variance alone or carried to b.
+vec3 slope_products(vec2 b, float kappa, bool carried) {
+    float variance = 1.0 / max(kappa, LEAST_SLOPE_CONCENTRATION);
+    vec3 square = vec3(b.x * b.x, b.x * b.y, b.y * b.y);
+    vec3 own = vec3(variance, 0.0, variance);
+    return square + (carried ? (1.0 + square.x + square.z) * (own + variance * square) : own);
 }
 
 #endif

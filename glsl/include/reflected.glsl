@@ -1,5 +1,6 @@
 // What pre-convolved light is looked up with: a material seen from one direction as lobes of light directions, and its diffuse
-// part. src/distribution/reflected.rs is the f64 twin. Include after materials.glsl.
+// part. src/distribution/reflected.rs is the f64 twin. Include after materials.glsl,
+// and after lobes.glsl where the filter leaves lobes.
 #ifndef REFLECTED_GLSL
 #define REFLECTED_GLSL
 #include "vmf.glsl"
@@ -52,6 +53,53 @@ ReflectedLobe reflected_lobe(Material m, uint i, vec3 wo) {
     lobe.weight = seen ? value * (wi.z * peak / vmf_normalisation(lobe.kappa)) : vec3(0.0);
     return lobe;
 }
+
+#ifdef LOBES_GLSL
+// Lobe i of those that the filter found, seen from wo. A Gaussian of slopes counts as the lobe about its mean slope with the mean
+// of its variances.
+ReflectedLobe reflected_found(Material m, Lobes l, uint i, vec3 wo) {
+    uint kind = m.record.kind.x;
+    bool ggx = kind == REFLECTANCE_GGX, cosine = kind == REFLECTANCE_BLINN_PHONG;
+    vec3 centre;
+    float kappa, peak, weight; // of half vectors
+    if (SLOPES) {
+        vec4 axis = lobe_axis[2u * i];
+        vec3 covariance = lobe_shape[2u * i + 1u].xyz;
+        float square = 1.0 + dot(axis.xy, axis.xy); // 1 / cos^2
+        centre = from_tangent(m, vec3(-axis.xy, 1.0) * inversesqrt(square));
+        kappa = square * (1.0 + square) / (covariance.x + covariance.z);
+        peak = axis.z * square * square;
+        weight = axis.w;
+    } else {
+        centre = lobe_axis[i].xyz;
+        float a = lobe_shape[i].x;
+        kappa = ggx ? 2.0 / a : (cosine ? a + 2.0 : a);
+        peak = lobe_shape[i].y;
+        weight = lobe_shape[i].z;
+    }
+    float cosine_to = dot(wo, centre);
+    ReflectedLobe lobe;
+    lobe.direction = centre * (2.0 * cosine_to) - wo;
+    bool seen = cosine_to > 0.0 && lobe.direction.z > 0.0;
+    cosine_to = seen ? cosine_to : 1.0;
+    vec3 wi = seen ? lobe.direction : wo;
+    lobe.kappa = kappa / (4.0 * cosine_to);
+    bool facet = !SLOPES && l.facets;
+    float ci = facet ? cosine_to : wi.z;
+    float open = facet ? 0.25 / (ci * ci) : cavity_masking(wi, wo, centre);
+    if (ggx && !SLOPES) {
+        float masking = ggx_masking(ci, lobe_shape[i].x);
+        open = 1.0 / (masking * masking);
+    }
+    vec3 f = m.record.f0.rgb;
+    if (ggx) {
+        float c = clamp(1.0 - cosine_to, 0.0, 1.0), c2 = c * c;
+        f += (1.0 - f) * (c2 * c2 * c);
+    }
+    lobe.weight = seen ? f * (open * ci * peak * weight / vmf_normalisation(lobe.kappa)) : vec3(0.0);
+    return lobe;
+}
+#endif
 
 // Factor on irradiance in 1/sr.
 vec3 reflected_diffuse(Material m, vec3 wo) {

@@ -70,7 +70,7 @@ pub fn lobes(base: &[Lobe], normal: DVec3, rule: Rule) -> Vec<Lobe> {
 }
 
 /// The frame about a normal of any length: x along the surface's tangent, as far as it is perpendicular to the normal.
-fn about(normal: DVec3) -> DMat3 {
+pub(crate) fn about(normal: DVec3) -> DMat3 {
     let z = normal.try_normalize().unwrap_or(DVec3::Z);
     let x = (DVec3::X - z * z.x).try_normalize().unwrap_or(DVec3::NEG_Z);
     DMat3::from_cols(x, z.cross(x), z)

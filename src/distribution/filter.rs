@@ -239,6 +239,16 @@ impl<'a> Filtered<'a> {
         }
     }
 
+    /// The mean vector of what is stored, of a length above 0: of lobes kept apart the first one's, of slopes their frame's normal.
+    pub fn mean_vector(&self, texel: &[f64]) -> DVec3 {
+        let vector = |t: &[f64; 5]| DVec3::new(t[0], t[1], t[2]);
+        match self.filter.storage() {
+            Storage::Directions { .. } => texel.as_chunks().0.first().map_or(DVec3::Z, vector),
+            Storage::Cells(_) => texel.as_chunks().0.iter().map(vector).sum(),
+            Storage::Slopes { .. } => DVec3::Z,
+        }
+    }
+
     fn direction(&self, [x, y, z, kappa, weight]: [f64; DIRECTION]) -> Option<Lobe> {
         if weight <= LEAST_WEIGHT {
             return None;

@@ -16,9 +16,11 @@ pub mod prefilter;
 pub mod reflected;
 pub mod slope;
 pub mod suns;
+pub mod surface;
 pub mod vmf;
 
 pub use brdf_map::BrdfMap;
 pub use filter::{Filter, Filtered};
 pub use mixture::Mixture;
 pub use partition::Cells;
+pub use surface::Surface;

@@ -55,27 +55,33 @@ impl Session {
         Ok((bytes, format, extent))
     }
 
-    /// What the filter stores of a material, if it stores anything: size and texels of each level, row by row, as
+    /// What the filter stores of a material, if it stores anything: moments and cells, layer by layer, as
     /// `glsl/include/moments.glsl` says.
     ///
     /// # Errors
     /// The device's.
-    pub fn moments(&mut self, material: usize) -> Result<Option<MomentLevels>> {
+    pub fn moments(&mut self, material: usize) -> Result<Option<[Vec<MomentLevels>; 2]>> {
         let renderer = self.renderer.as_ref().ok_or_else(closed)?;
-        let Some((image, layer)) = renderer.moments(material) else { return Ok(None) };
-        let desc = image.desc;
-        (0..desc.levels)
-            .map(|level| {
-                let [width, height, _] = desc.level_extent(level);
-                let bytes = self.read(u64::from(width) * u64::from(height) * 16, |renderer, rec, target| {
-                    if let Some((image, _)) = renderer.moments(material) {
-                        copy_level(rec, image, target, level, layer);
-                    }
-                })?;
-                Ok(([width, height], bytemuck::pod_collect_to_vec(&bytes)))
-            })
-            .collect::<Result<_>>()
-            .map(Some)
+        let Some(arrays) = renderer.moments(material) else { return Ok(None) };
+        let layers = arrays.map(|array| array.map(|(image, layers)| (image.desc, layers)));
+        let mut found = [Vec::new(), Vec::new()];
+        for ((i, layers), found) in layers.into_iter().enumerate().zip(&mut found) {
+            for (desc, layer) in layers.into_iter().flat_map(|(desc, layers)| layers.map(move |layer| (desc, layer))) {
+                let level = |level| {
+                    let [width, height, _] = desc.level_extent(level);
+                    let bytes = self.read(u64::from(width) * u64::from(height) * 16, |renderer, rec, target| {
+                        if let Some((image, _)) =
+                            renderer.moments(material).and_then(|[moments, cells]| [moments, cells][i].clone())
+                        {
+                            copy_level(rec, image, target, level, layer);
+                        }
+                    })?;
+                    Ok(([width, height], bytemuck::pod_collect_to_vec(&bytes)))
+                };
+                found.push((0..desc.levels).map(level).collect::<Result<_>>()?);
+            }
+        }
+        Ok(Some(found))
     }
 
     /// What `record` copies into a host-visible buffer of `size` bytes.

@@ -13,6 +13,7 @@ use crate::offline::error::{Error, Result};
 use crate::offline::headless::Headless;
 use crate::offline::lobe_cache;
 use crate::offline::mesh_buffers::MeshBuffers;
+pub use crate::offline::read_back::MomentLevels;
 use crate::offline::read_back::copy_buffer;
 use crate::offline::world::{Camera, World};
 use crate::pass::PassContext;

@@ -12,9 +12,9 @@ use crate::gpu::retire::Retired;
 use crate::gpu::sampler::Samplers;
 use crate::light::Light;
 use crate::material::Material;
-use crate::pass::PassContext;
 use crate::pass::materials::MaterialImages;
 use crate::pass::prefilter::Prefiltered;
+use crate::pass::{PassContext, shade};
 use crate::reflectance::Model;
 use ash::vk::DescriptorType as D;
 
@@ -38,6 +38,7 @@ pub const INTERFACE: Interface = Interface {
         D::COMBINED_IMAGE_SAMPLER,
         D::COMBINED_IMAGE_SAMPLER,
         D::STORAGE_BUFFER,
+        D::COMBINED_IMAGE_SAMPLER,
     ],
 };
 
@@ -48,6 +49,7 @@ pub(crate) struct Io<'a> {
     /// Of the `filter` pass.
     pub normals: &'a Image,
     pub factors: &'a Image,
+    pub lobes: &'a Image,
     pub prefiltered: &'a Prefiltered,
     pub materials: &'a MaterialImages,
     /// Exact ones, as [`check_lights`] says.
@@ -83,7 +85,10 @@ pub(crate) fn check_lights(lights: &[Light]) -> Result<()> {
 impl Base {
     pub fn new(p: &mut PassContext<'_, '_>, config: &Config) -> Result<Self> {
         let mut make = |lights| {
-            ComputePipeline::new(p.build, p.modules, &INTERFACE, p.bridge, p.slots, &[u32::from(config.widened()), lights])
+            // Constants 2 to 5 are of no use here.
+            let own = [u32::from(config.widened()), lights, 0, 0, 0, 0];
+            let constants: Vec<_> = own.into_iter().chain(shade::lobe_constants(config, true)).collect();
+            ComputePipeline::new(p.build, p.modules, &INTERFACE, p.bridge, p.slots, &constants)
         };
         Ok(Self([make(0)?, make(1)?]))
     }
@@ -94,6 +99,7 @@ impl Base {
         io.materials.sampled(rec);
         rec.image(io.normals, Access::COMPUTE_SAMPLED);
         rec.image(io.factors, Access::COMPUTE_SAMPLED);
+        rec.image(io.lobes, Access::COMPUTE_SAMPLED);
         rec.overwrite(io.radiance, Access::COMPUTE_WRITE);
         rec.flush();
         let [first, second, irradiance, suns] = io.prefiltered.resources(io.samplers);
@@ -107,6 +113,7 @@ impl Base {
             second,
             irradiance,
             suns,
+            Resource::Sampled(io.lobes, io.samplers.nearest),
         ];
         let pipeline = &self.0[usize::from(io.light_count > 0)];
         pipeline.bind(rec, io.bridge, &resources, &());

@@ -1,8 +1,8 @@
-//! Pass 0b, continued: the lobe of each texel of a material's maps, as the filters with one lobe store it (Xu et al. 2017, section
-//! 4; [`crate::moments`] is the f64 twin). Once a set of materials.
+//! Pass 0b, continued: the lobes of each texel of a material's maps, as the filters store them (Xu et al. 2017, section 4;
+//! [`crate::moments`] is the f64 twin). Once a set of materials.
 
-use crate::config::Filter;
-use crate::distribution;
+use crate::config::{Filter, MOST_BASE_LOBES};
+use crate::distribution::{self, vmf};
 use crate::error::Result;
 use crate::gpu::access::Access;
 use crate::gpu::image::{Image, ImageDesc};
@@ -13,6 +13,8 @@ use crate::gpu::sampler::Samplers;
 use crate::moments::{Base, Parameter};
 use crate::pass::PassContext;
 use crate::pass::maps::MapImages;
+use crate::reflectance::Lobe;
+use crate::texture::halved;
 use ash::vk::{self, DescriptorType as D};
 use bytemuck::{Pod, Zeroable};
 
@@ -31,42 +33,43 @@ pub const INTERFACE: Interface = Interface {
 
 /// Sizes that the moments of one set of materials may have: beyond them the smallest take a larger one.
 const MAX_SIZES: usize = 4;
+/// Where cells have arrays of their own.
+const MAX_SIZES_OF_CELLS: usize = 2;
 
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 struct Push {
+    base: [[f32; 4]; MOST_BASE_LOBES],
+    weights: [f32; MOST_BASE_LOBES],
+    count: u32,
+    lobes: u32,
     layer: i32,
     normal_layer: i32,
     roughness_layer: i32,
-    lobes: u32,
-    spread: f32,
     rule: f32,
     most: f32,
+    upright: u32,
 }
 
 /// The number by which `glsl/include/moments.glsl` knows a filter.
 pub(crate) fn number(filter: Filter) -> u32 {
-    match filter.stored() {
-        Some(distribution::Filter::Fixed) => 1,
-        Some(distribution::Filter::Toksvig) => 2,
-        Some(distribution::Filter::Vmf1) => 3,
-        _ => 0,
-    }
+    let stored = filter.stored();
+    distribution::Filter::ALL.iter().position(|known| Some(*known) == stored).unwrap_or_default() as u32
 }
 
-/// What becomes of a material's lobes: LOBES_* of `glsl/include/moments.glsl`.
-pub(crate) fn lobes(base: Base, parameter: Parameter) -> u32 {
-    match (base, parameter) {
-        (Base::Normals, _) => 0,
-        (Base::Lobe { .. }, Parameter::Alpha) => 1,
-        (Base::Lobe { .. }, Parameter::Exponent) => 2,
+/// What a concentration is of: LOBES_* of `glsl/include/moments.glsl`.
+pub(crate) fn lobes(filtered: bool, parameter: Parameter) -> u32 {
+    match (filtered, parameter) {
+        (false, _) => 0,
+        (true, Parameter::Alpha) => 1,
+        (true, Parameter::Exponent) => 2,
     }
 }
 
 /// Class and layer of a texture.
 pub(crate) type Place = (usize, usize);
 
-/// What one layer of moments is made from.
+/// What moments are made from.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Source {
     pub normal: Option<Place>,
@@ -77,19 +80,85 @@ pub(crate) struct Source {
     pub parameter: Parameter,
 }
 
-/// Layers of moments of one size.
+/// How many layers a source takes: of moments, and of cells.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Layers {
+    pub moments: usize,
+    pub cells: usize,
+}
+
+impl Layers {
+    /// As `glsl/include/moments.glsl` says.
+    pub fn of(filter: Filter, base: &Base) -> Self {
+        use distribution::Filter as F;
+        let count = base.lobes().len();
+        let (merged, each, cells) = match filter.stored() {
+            Some(F::Naive | F::Fixed | F::ToksvigLobe) | None => (false, 1, 0),
+            Some(F::Toksvig | F::Vmf1) => (true, 1, 0),
+            Some(F::Lean | F::Leadr) => (true, 2, 0),
+            Some(F::LeanLobe) => (false, 2, 0),
+            Some(F::Vmf4) => (false, 1, 4),
+            Some(F::Vmf8) => (false, 1, 8),
+            Some(F::Vmf) => (false, 1, 10),
+        };
+        let lobes = if merged { count.min(1) } else { count };
+        Self { moments: usize::from(!base.upright()) + each * lobes, cells: if count > 0 { cells } else { 0 } }
+    }
+}
+
+/// Moments of one size.
 #[derive(Debug)]
 pub(crate) struct Group {
     pub size: [u32; 2],
-    pub sources: Vec<Source>,
+    /// With the first of the layers of each.
+    pub sources: Vec<(Source, Layers)>,
+    /// All layers.
+    pub layers: Layers,
+}
+
+impl Group {
+    pub fn new(size: [u32; 2]) -> Self {
+        Self { size, sources: Vec::new(), layers: Layers::default() }
+    }
+
+    /// The first layers of `source`, which takes `layers` unless it is here already.
+    pub fn place(&mut self, source: Source, layers: Layers) -> Layers {
+        if let Some((_, first)) = self.sources.iter().find(|(known, _)| *known == source) {
+            return *first;
+        }
+        let first = self.layers;
+        self.sources.push((source, first));
+        self.layers = Layers { moments: first.moments + layers.moments, cells: first.cells + layers.cells };
+        first
+    }
+
+    /// Images of moments and, where there are some, of cells, with room for the mips that are read.
+    pub fn images(&self, build: &mut Build<'_>) -> Result<Vec<Image>> {
+        let [width, height] = self.size;
+        let levels = 1 + width.max(height).ilog2();
+        // Beside cells only a mean normal has mips.
+        let flat = self.layers.cells > 0 && self.sources.iter().all(|(source, _)| source.base.upright());
+        let mut images = vec![image(build, "moments", self.size, self.layers.moments, if flat { 1 } else { levels })?];
+        if self.layers.cells > 0 {
+            images.push(image(build, "cells", halved(self.size), self.layers.cells, (levels - 1).max(1))?);
+        }
+        Ok(images)
+    }
+}
+
+fn image(build: &mut Build<'_>, name: &'static str, [width, height]: [u32; 2], layers: usize, levels: u32) -> Result<Image> {
+    let usage = vk::ImageUsageFlags::STORAGE | vk::ImageUsageFlags::SAMPLED | vk::ImageUsageFlags::TRANSFER_SRC;
+    let desc = ImageDesc::new(name, vk::Format::R32G32B32A32_SFLOAT, [width, height, 1], usage);
+    Image::new(build, ImageDesc { layers: Some(layers as u32), levels, ..desc })
 }
 
 /// The sizes of the arrays for moments of the sizes `wanted`; each of these fits one.
-pub(crate) fn sizes(wanted: impl Iterator<Item = [u32; 2]>) -> Vec<[u32; 2]> {
+pub(crate) fn sizes(wanted: impl Iterator<Item = [u32; 2]>, cells: bool) -> Vec<[u32; 2]> {
+    let most = if cells { MAX_SIZES_OF_CELLS } else { MAX_SIZES };
     let mut sizes: Vec<[u32; 2]> = wanted.collect();
     sizes.sort_unstable_by_key(|[w, h]| (u64::from(*w) * u64::from(*h), *w));
     sizes.dedup();
-    while sizes.len() > MAX_SIZES {
+    while sizes.len() > most {
         let smallest = sizes.remove(0);
         sizes[0] = [sizes[0][0].max(smallest[0]), sizes[0][1].max(smallest[1])];
     }
@@ -104,27 +173,22 @@ pub(crate) fn fitting(groups: &[Group], size: [u32; 2]) -> Option<usize> {
     (0..groups.len()).filter(|i| fits(&groups[*i])).min_by_key(area)
 }
 
-/// The image of a group, with room for all its mips.
-pub(crate) fn image(build: &mut Build<'_>, group: &Group) -> Result<Image> {
-    let usage = vk::ImageUsageFlags::STORAGE | vk::ImageUsageFlags::SAMPLED | vk::ImageUsageFlags::TRANSFER_SRC;
-    let [width, height] = group.size;
-    let desc = ImageDesc {
-        layers: Some(group.sources.len() as u32),
-        levels: 1 + width.max(height).ilog2(),
-        ..ImageDesc::new("moments", vk::Format::R32G32B32A32_SFLOAT, [width, height, 1], usage)
-    };
-    Image::new(build, desc)
-}
-
 pub(crate) struct Io<'a> {
     /// Textures, and behind them the moments, out.
     pub maps: &'a MapImages,
 }
 
+/// Arrays of one group: classes and views of their levels.
+pub(crate) struct Arrays {
+    pub moments: (usize, Vec<vk::ImageView>),
+    pub cells: Option<(usize, Vec<vk::ImageView>)>,
+}
+
 /// The sets and views of one recording.
 pub(crate) struct Work {
-    /// Class of each array, its layers and the views of its levels.
-    pub arrays: Vec<(usize, Vec<vk::ImageView>)>,
+    pub arrays: Vec<Arrays>,
+    /// The first class that is written.
+    first: usize,
     pushes: Vec<(usize, Push)>,
     sets: Sets,
 }
@@ -136,7 +200,7 @@ impl BrdfMap {
         Ok(Self(ComputePipeline::new(p.build, p.modules, &INTERFACE, p.bridge, 0, &[number(filter)])?))
     }
 
-    /// What the recording needs: `groups` of which the images are `classes`, from `first` on.
+    /// What the recording needs: `groups` of which the images are `classes`, from `first` on, as [`Group::images`] has them.
     pub fn prepare(
         &self,
         build: &mut Build<'_>,
@@ -146,35 +210,27 @@ impl BrdfMap {
         first: usize,
     ) -> Result<Work> {
         let sets = self.0.sets(build, groups.iter().map(|g| g.sources.len()).sum())?;
-        let (mut arrays, mut pushes) = (Vec::new(), Vec::new());
-        for (class, group) in (first..).zip(groups) {
+        let (mut arrays, mut pushes, mut class) = (Vec::new(), Vec::new(), first);
+        for group in groups {
             let views = classes[class].level_views(build)?;
-            for (layer, source) in group.sources.iter().enumerate() {
+            for (source, layers) in &group.sources {
                 let read = |place: Option<Place>| Resource::Sampled(classes[place.map_or(0, |p| p.0)], samplers.nearest);
                 let resources = [read(source.normal), read(source.roughness), Resource::Storage(views[0])];
                 write_set(&build.cx.device, sets.sets[pushes.len()], &resources);
-                let of = |place: Option<Place>| place.map_or(-1, |p| p.1 as i32);
-                let push = Push {
-                    layer: layer as i32,
-                    normal_layer: of(source.normal),
-                    roughness_layer: of(source.roughness),
-                    lobes: lobes(source.base, source.parameter),
-                    spread: if let Base::Lobe { spread } = source.base { spread as f32 } else { 0.0 },
-                    rule: source.rule[0],
-                    most: source.rule[1],
-                };
-                pushes.push((class, push));
+                pushes.push((class, Push::of(source, layers)));
             }
-            arrays.push((class, views));
+            let cells = class + 1;
+            let of_cells = if group.layers.cells > 0 { Some((cells, classes[cells].level_views(build)?)) } else { None };
+            arrays.push(Arrays { moments: (class, views), cells: of_cells });
+            class += 1 + usize::from(group.layers.cells > 0);
         }
-        Ok(Work { arrays, pushes, sets })
+        Ok(Work { arrays, first, pushes, sets })
     }
 
     pub fn record(&self, rec: &mut Recorder<'_>, io: &Io<'_>, work: &Work) {
         rec.begin(NAME);
-        let first = work.arrays.first().map_or(0, |(class, _)| *class);
-        (0..first).for_each(|i| rec.image(io.maps.class(i), Access::COMPUTE_SAMPLED));
-        work.arrays.iter().for_each(|(class, _)| rec.overwrite(io.maps.class(*class), Access::COMPUTE_WRITE));
+        (0..work.first).for_each(|i| rec.image(io.maps.class(i), Access::COMPUTE_SAMPLED));
+        work.arrays.iter().for_each(|a| rec.overwrite(io.maps.class(a.moments.0), Access::COMPUTE_WRITE));
         rec.flush();
         for ((class, push), set) in work.pushes.iter().zip(&work.sets.sets) {
             self.0.bind_set(rec, *set, push);
@@ -188,9 +244,38 @@ impl BrdfMap {
     }
 }
 
+impl Push {
+    fn of(source: &Source, layers: &Layers) -> Self {
+        let of = |place: Option<Place>| place.map_or(-1, |p| p.1 as i32);
+        let lobes_of_base = source.base.lobes();
+        let mut push = Self {
+            base: [[0.0; 4]; MOST_BASE_LOBES],
+            weights: weights(lobes_of_base),
+            count: lobes_of_base.len() as u32,
+            lobes: lobes(!lobes_of_base.is_empty(), source.parameter),
+            layer: layers.moments as i32,
+            normal_layer: of(source.normal),
+            roughness_layer: of(source.roughness),
+            rule: source.rule[0],
+            most: source.rule[1],
+            upright: u32::from(source.base.upright()),
+        };
+        for (base, lobe) in push.base.iter_mut().zip(lobes_of_base) {
+            *base = lobe.mu.extend(vmf::spread(lobe.kappa)).as_vec4().to_array();
+        }
+        push
+    }
+}
+
+/// Of lobes, as shaders read them.
+pub(crate) fn weights(lobes: &[Lobe]) -> [f32; MOST_BASE_LOBES] {
+    std::array::from_fn(|i| lobes.get(i).map_or(0.0, |lobe| lobe.weight as f32))
+}
+
 impl Work {
     pub fn retire(self, bag: &mut Retired) {
-        self.arrays.into_iter().flat_map(|(_, views)| views).for_each(|view| bag.push(Handle::View(view)));
+        let views = self.arrays.into_iter().flat_map(|a| a.moments.1.into_iter().chain(a.cells.into_iter().flat_map(|c| c.1)));
+        views.for_each(|view| bag.push(Handle::View(view)));
         self.sets.retire(bag);
     }
 }
@@ -202,9 +287,10 @@ mod tests {
     #[test]
     fn moments_have_few_sizes_and_each_fits() {
         let wanted = [[64, 64], [8, 128], [1024, 1024], [64, 64], [16, 16], [2, 2], [512, 1024]];
-        let sizes = sizes(wanted.into_iter());
+        assert_eq!(super::sizes(wanted.into_iter(), true), [[512, 1024], [1024, 1024]]);
+        let sizes = sizes(wanted.into_iter(), false);
         assert!(sizes.len() <= MAX_SIZES && sizes.contains(&[1024, 1024]), "{sizes:?}");
-        let groups: Vec<_> = sizes.into_iter().map(|size| Group { size, sources: vec![] }).collect();
+        let groups: Vec<_> = sizes.into_iter().map(Group::new).collect();
         for [w, h] in wanted {
             let [width, height] = groups[fitting(&groups, [w, h]).unwrap()].size;
             assert!(width >= w && height >= h);

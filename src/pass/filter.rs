@@ -1,6 +1,6 @@
-//! Pass 2: what the surfaces' textures say at the pixel's scale: shading normals, factors and roughness.
+//! Pass 2: what the surfaces' textures say at the pixel's scale: shading normals, factors, roughness and lobes.
 
-use crate::config;
+use crate::config::Config;
 use crate::error::Result;
 use crate::gpu::access::Access;
 use crate::gpu::buffer::Buffer;
@@ -37,6 +37,7 @@ pub const INTERFACE: Interface = Interface {
         D::COMBINED_IMAGE_SAMPLER,
         D::STORAGE_IMAGE,
         D::STORAGE_IMAGE,
+        D::STORAGE_IMAGE,
     ],
 };
 
@@ -49,16 +50,20 @@ pub(crate) struct Io<'a> {
     pub normals: &'a Image,
     /// Out: as `glsl/include/factors.glsl` packs them.
     pub factors: &'a Image,
+    /// Out, where the filter finds lobes: as `glsl/include/lobes.glsl` reads them.
+    pub lobes: &'a Image,
 }
 
 /// Compiled for the classes that a set of materials uses.
 pub(crate) struct Filter(ComputePipeline);
 
 impl Filter {
-    /// `geometric` says whether the mesh's curvature widens lobes.
-    pub fn new(p: &mut PassContext<'_, '_>, filter: config::Filter, uses: Uses, geometric: bool) -> Result<Self> {
-        let [albedo, specular, normal, roughness, moments] = uses;
-        let constants = [albedo, specular, normal, roughness, u32::from(geometric), moments, brdf_map::number(filter)];
+    pub fn new(p: &mut PassContext<'_, '_>, config: &Config, uses: Uses) -> Result<Self> {
+        let [albedo, specular, normal, roughness, moments, cells] = uses;
+        let (geometric, filter) = (u32::from(config.widened()), config.filter);
+        let lobes = [brdf_map::number(filter), filter.lobe_layers(), config.anisotropy];
+        let constants = [albedo, specular, normal, roughness, geometric, moments, cells];
+        let constants: Vec<_> = constants.into_iter().chain(lobes).collect();
         Ok(Self(ComputePipeline::new(p.build, p.modules, &INTERFACE, p.bridge, p.slots, &constants)?))
     }
 
@@ -67,11 +72,12 @@ impl Filter {
         io.maps.sampled(rec);
         rec.overwrite(io.normals, Access::COMPUTE_WRITE);
         rec.overwrite(io.factors, Access::COMPUTE_WRITE);
+        rec.overwrite(io.lobes, Access::COMPUTE_WRITE);
         rec.flush();
         let mut resources = vec![Resource::Uniform(io.frame), Resource::Buffer(io.maps.records())];
         // Bindings without a class of their own are never read.
         resources.extend((0..MAX_CLASSES).map(|i| Resource::Sampled(io.maps.class(i), io.samplers.tiled)));
-        resources.extend([Resource::Storage(io.normals.view), Resource::Storage(io.factors.view)]);
+        resources.extend([io.normals, io.factors, io.lobes].map(|image| Resource::Storage(image.view)));
         self.0.bind(rec, io.bridge, &resources, &());
         self.0.dispatch(rec, io.normals.extent());
         rec.end();

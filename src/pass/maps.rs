@@ -1,6 +1,6 @@
 //! Materials' textures on the device: layers of arrays by size and format, and where each material's maps are.
 
-use crate::config::Filter;
+use crate::config::{Filter, MOST_BASE_LOBES};
 use crate::error::Result;
 use crate::gpu::access::Access;
 use crate::gpu::buffer::Buffer;
@@ -10,8 +10,8 @@ use crate::gpu::retire::{Build, Retired};
 use crate::gpu::sampler::Samplers;
 use crate::gpu::upload::{BufferUpload, ImageUpload};
 use crate::material::{Material, Roughness};
-use crate::moments::{Base, Parameter};
-use crate::pass::brdf_map::{self, BrdfMap, Group, Place, Source};
+use crate::moments::{Base, BaseLobes, Parameter};
+use crate::pass::brdf_map::{self, BrdfMap, Group, Layers, Place, Source};
 use crate::pass::vmf_mips::{self, VmfMips};
 use crate::reflectance::Model;
 use crate::texture::classes::MAX_CLASSES;
@@ -19,8 +19,8 @@ use crate::texture::{Class, Classes, Format, Slots};
 use ash::vk;
 use bytemuck::{Pod, Zeroable};
 
-/// Classes that hold albedo, specular, normal and roughness maps and moments, one bit each.
-pub(crate) type Uses = [u32; 5];
+/// Classes that hold albedo, specular, normal and roughness maps, moments and cells, one bit each.
+pub(crate) type Uses = [u32; 6];
 
 /// Mirrors `MapRecord` in `glsl/filter.comp`.
 #[repr(C)]
@@ -31,7 +31,12 @@ struct Record {
     rule: [f32; 2],
     without: f32,
     moments: u32,
+    cells: u32,
     lobes: u32,
+    weights: [f32; MOST_BASE_LOBES],
+    count: u32,
+    upright: u32,
+    concentration: f32,
     unused: u32,
 }
 
@@ -40,10 +45,23 @@ pub(crate) struct MapImages {
     records: Buffer,
     /// Textures, and behind them moments.
     classes: Vec<Image>,
-    /// Class and layer of each material's moments.
+    /// Where each material's moments are.
     #[cfg_attr(not(feature = "offline"), expect(dead_code, reason = "only `offline` reads them back"))]
-    moments: Vec<Option<Place>>,
+    moments: Vec<Option<MomentsPlace>>,
+    /// Whether there are materials whose lobes stay as they are, whatever the filter.
+    pub unfiltered: bool,
 }
+
+/// Where a material's moments are: class, first layer and number of layers, and the same of its cells.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct MomentsPlace {
+    pub moments: (Place, usize),
+    pub cells: Option<(Place, usize)>,
+}
+
+/// An array and layers of it: of moments and of cells.
+#[cfg(feature = "offline")]
+pub(crate) type MomentArrays<'a> = [Option<(&'a Image, std::ops::Range<u32>)>; 2];
 
 /// What textures and their moments are read with.
 pub(crate) struct Reading<'a> {
@@ -60,7 +78,8 @@ pub(crate) struct MapsUpload {
     records: BufferUpload,
     classes: Vec<ImageUpload>,
     moments: Vec<Image>,
-    places: Vec<Option<Place>>,
+    places: Vec<Option<MomentsPlace>>,
+    unfiltered: bool,
     pub uses: Uses,
     pub work: Option<(brdf_map::Work, vmf_mips::Work)>,
 }
@@ -109,27 +128,24 @@ fn code(place: Option<Place>) -> u32 {
     place.map_or(0, |(class, layer)| (layer << 3 | class) as u32 + 1)
 }
 
-/// The moments of `materials`, of which `bases` say what is filtered: one group for each size, one layer for each source. Of each
-/// material its group and layer.
+/// The moments of `materials`, of which `bases` say what is filtered: one group for each size. Of each material its group, the
+/// first of its layers there and how many there are.
 fn groups(
     materials: &[Material],
     bases: &[Option<Base>],
     sizes: Vec<[u32; 2]>,
     slots: &[Slots],
-) -> (Vec<Group>, Vec<Option<Place>>) {
-    let mut groups: Vec<_> = sizes.into_iter().map(|size| Group { size, sources: Vec::new() }).collect();
+    filter: Filter,
+) -> (Vec<Group>, Vec<Option<(usize, [Layers; 2])>>) {
+    let mut groups: Vec<_> = sizes.into_iter().map(Group::new).collect();
     let mut place = |((material, base), slots): ((&Material, &Option<Base>), &Slots)| {
         let base = (*base)?;
         let group = brdf_map::fitting(&groups, base.size(material))?;
         let roughness = base.roughness(material).and(slots.roughness);
         let parameter = Parameter::of(&material.model);
         let source = Source { normal: slots.normal, roughness, rule: rule(material), base, parameter };
-        let sources = &mut groups[group].sources;
-        let layer = sources.iter().position(|known| *known == source).unwrap_or_else(|| {
-            sources.push(source);
-            sources.len() - 1
-        });
-        Some((group, layer))
+        let layers = Layers::of(filter, &base);
+        Some((group, [groups.get_mut(group)?.place(source, layers), layers]))
     };
     let places = materials.iter().zip(bases).zip(slots).map(&mut place).collect();
     (groups, places)
@@ -137,22 +153,36 @@ fn groups(
 
 impl MapsUpload {
     pub fn new(build: &mut Build<'_>, materials: &[Material], reading: &Reading<'_>) -> Result<Self> {
-        let base = |material| reading.passes.and_then(|_| Base::of(material));
+        let filters = reading.passes.is_some();
+        let base = |material| if filters { Base::of(material) } else { None };
         let bases: Vec<_> = materials.iter().map(base).collect();
-        let sizes = brdf_map::sizes(materials.iter().zip(&bases).filter_map(|(m, base)| Some(base.as_ref()?.size(m))));
-        let Classes { mut classes, slots } = Classes::within(materials, MAX_CLASSES - sizes.len());
+        let wanted = materials.iter().zip(&bases).filter_map(|(m, base)| Some(base.as_ref()?.size(m)));
+        let sizes = brdf_map::sizes(wanted, reading.filter.has_cells());
+        let arrays = sizes.len() * (1 + usize::from(reading.filter.has_cells()));
+        let Classes { mut classes, slots } = Classes::within(materials, MAX_CLASSES - arrays);
         if classes.is_empty() {
             // Something to bind.
             let texel = std::sync::Arc::new(crate::Texture::scalar([1, 1], &[0.0])?);
             classes.push(Class { size: [1, 1], format: Format::Half1, layers: vec![texel] });
         }
-        let (groups, places) = groups(materials, &bases, sizes, &slots);
-        let places: Vec<_> = places.into_iter().map(|p| p.map(|(group, layer)| (classes.len() + group, layer))).collect();
+        let (groups, places) = groups(materials, &bases, sizes, &slots, reading.filter);
+        // Cells are behind the moments of their group.
+        let firsts: Vec<_> = groups
+            .iter()
+            .scan(classes.len(), |next, group| Some(std::mem::replace(next, *next + 1 + usize::from(group.layers.cells > 0))))
+            .collect();
+        let place = |(group, [first, layers]): (usize, [Layers; 2])| {
+            let class = *firsts.get(group)?;
+            let cells = (layers.cells > 0).then_some(((class + 1, first.cells), layers.cells));
+            Some(MomentsPlace { moments: ((class, first.moments), layers.moments), cells })
+        };
+        let places: Vec<_> = places.into_iter().map(|p| p.and_then(place)).collect();
 
-        let mut uses = Uses::default();
+        let (mut uses, mut unfiltered) = (Uses::default(), false);
         let mut records = Vec::with_capacity(materials.len());
         for (((material, slots), base), place) in materials.iter().zip(slots).zip(bases).zip(&places) {
-            let mut slots = [slots.albedo, slots.specular, slots.normal, slots.roughness, *place];
+            let (moments, cells) = (place.map(|p| p.moments.0), place.and_then(|p| p.cells.map(|c| c.0)));
+            let mut slots = [slots.albedo, slots.specular, slots.normal, slots.roughness, moments, cells];
             if let Some(base) = base {
                 slots[2] = None;
                 slots[3] = slots[3].filter(|_| base == Base::Normals);
@@ -160,38 +190,50 @@ impl MapsUpload {
             for (uses, (class, _)) in uses.iter_mut().zip(slots).filter_map(|(uses, slot)| Some((uses, slot?))) {
                 *uses |= 1 << class;
             }
-            let [albedo, specular, normal, roughness, moments] = slots.map(code);
+            // Without maps a lobe about the normal is found as it is.
+            let lone = BaseLobes::of(&material.model).filter(|own| filters && own.upright() && own.lobes().len() == 1);
+            let lobes = base.or(lone.map(Base::Lobes)).unwrap_or(Base::Normals);
+            unfiltered |= lobes.lobes().is_empty();
+            let [albedo, specular, normal, roughness, moments, cells] = slots.map(code);
             records.push(Record {
                 places: [albedo, specular, normal, roughness],
                 tiling: material.maps.tiling,
                 rule: rule(material),
                 without: if matches!(material.model, Model::Vmf(_)) { 0.0 } else { 1.0 },
                 moments,
-                lobes: base.map_or(0, |base| brdf_map::lobes(base, Parameter::of(&material.model))),
+                cells,
+                lobes: brdf_map::lobes(!lobes.lobes().is_empty(), Parameter::of(&material.model)),
+                weights: brdf_map::weights(lobes.lobes()),
+                count: lobes.lobes().len() as u32,
+                upright: u32::from(lobes.upright()),
+                concentration: lobes.lobes().first().map_or(0.0, |lobe| lobe.kappa as f32),
                 unused: 0,
             });
         }
         let classes = classes.iter().map(|class| upload(build, class)).collect::<Result<Vec<_>>>()?;
-        let moments = groups.iter().map(|group| brdf_map::image(build, group)).collect::<Result<Vec<_>>>()?;
+        let mut moments = Vec::new();
+        for group in &groups {
+            moments.extend(group.images(build)?);
+        }
         let work = match reading.passes.filter(|_| !groups.is_empty()) {
             Some((map, mips)) => {
                 let images: Vec<_> = classes.iter().map(|c| &c.image).chain(&moments).collect();
                 let map = map.prepare(build, reading.samplers, &groups, &images, classes.len())?;
-                let mips = mips.prepare(build, &map)?;
+                let mips = mips.prepare(build, &groups, &map, reading.filter)?;
                 Some((map, mips))
             }
             None => None,
         };
         let usage = vk::BufferUsageFlags::STORAGE_BUFFER;
         let records = BufferUpload::new(build, "maps", usage, bytemuck::cast_slice(&records))?;
-        Ok(Self { records, classes, moments, places, uses, work })
+        Ok(Self { records, classes, moments, places, unfiltered, uses, work })
     }
 
     pub fn record(self, rec: &mut Recorder<'_>, bag: &mut Retired) -> MapImages {
         let textures = self.classes.into_iter().map(|class| class.record(rec, bag));
         let mut classes: Vec<_> = textures.collect();
         classes.extend(self.moments);
-        MapImages { records: self.records.record(rec, bag), classes, moments: self.places }
+        MapImages { records: self.records.record(rec, bag), classes, moments: self.places, unfiltered: self.unfiltered }
     }
 }
 
@@ -205,11 +247,13 @@ impl MapImages {
         &self.classes[i.min(self.classes.len() - 1)]
     }
 
-    /// The array of a material's moments, and its layer there.
+    /// The arrays of a material's moments and of its cells, its first layer there and how many there are.
     #[cfg(feature = "offline")]
-    pub fn moments(&self, material: usize) -> Option<(&Image, u32)> {
-        let (class, layer) = (*self.moments.get(material)?)?;
-        Some((self.classes.get(class)?, layer as u32))
+    pub fn moments(&self, material: usize) -> Option<MomentArrays<'_>> {
+        let place = (*self.moments.get(material)?)?;
+        let array =
+            |((class, layer), count): (Place, usize)| Some((self.classes.get(class)?, layer as u32..(layer + count) as u32));
+        Some([array(place.moments), place.cells.and_then(array)])
     }
 
     /// Declares everything read by the pass that is open.

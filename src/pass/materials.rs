@@ -10,7 +10,6 @@ use crate::gpu::retire::{Build, Handle, Retired};
 use crate::gpu::sampler::Samplers;
 use crate::gpu::upload::{BufferUpload, ImageUpload};
 use crate::material::{MOST_KERNEL, Material};
-use crate::moments::most_added;
 use crate::pass::maps::{MapImages, MapsUpload, Reading, Uses};
 use crate::pass::{brdf_map, vmf_mips};
 use crate::reflectance::ladder::{Ladder, own_square};
@@ -206,7 +205,7 @@ impl MaterialsUpload {
             .1;
         let packed: Vec<_> = tables.all.iter().map(|(table, scale)| table.packed_at(*scale)).collect();
         let kernel = if reading.widened { MOST_KERNEL } else { 0.0 };
-        let ladders: Vec<_> = materials.iter().map(|m| Ladder::of(m, kernel + most_added(m, reading.filter))).collect();
+        let ladders: Vec<_> = materials.iter().map(|m| Ladder::of(m, kernel)).collect();
         let firsts = ladders.iter().scan(0, |next, ladder| Some(std::mem::replace(next, *next + ladder.steps())));
         let places: Vec<_> = ladders.iter().zip(firsts).map(|(ladder, first)| ladder.record(first)).collect();
         let mut records = records(materials, &tables, &places, size[0]);

@@ -62,6 +62,6 @@ pub fn interfaces() -> Vec<Interface> {
     all.extend(environment_bandwidth::INTERFACES);
     all.extend(luminance::INTERFACES);
     all.extend(prefilter::INTERFACES);
-    all.extend([brdf_map::INTERFACE, vmf_mips::INTERFACE]);
+    all.extend([brdf_map::INTERFACE, vmf_mips::CELLS, vmf_mips::INTERFACE]);
     all
 }

@@ -19,6 +19,7 @@ modules! {
     "gbuffer.vert",
     "gbuffer.frag",
     "brdf_map.comp",
+    "vmf_mips.cells.comp",
     "vmf_mips.comp",
     "filter.comp",
     "curvature.comp",

@@ -1,6 +1,6 @@
 //! Pass 8: reflected radiance of the listed samples (Bagher 2011, equations 1 and 2, section 3.3).
 
-use crate::config::{Config, Estimator};
+use crate::config::{Config, Estimator, Filter};
 use crate::error::Result;
 use crate::frequency::allocation::Allocation;
 use crate::gpu::access::Access;
@@ -38,6 +38,7 @@ pub const INTERFACE: Interface = Interface {
         D::STORAGE_IMAGE,
         D::COMBINED_IMAGE_SAMPLER,
         D::COMBINED_IMAGE_SAMPLER,
+        D::COMBINED_IMAGE_SAMPLER,
     ],
 };
 
@@ -57,6 +58,7 @@ pub(crate) struct Io<'a> {
     /// Of the `filter` pass.
     pub normals: &'a Image,
     pub factors: &'a Image,
+    pub lobes: &'a Image,
     pub environment: &'a EnvironmentImages,
     pub materials: &'a MaterialImages,
     pub arguments: &'a Buffer,
@@ -73,7 +75,19 @@ pub(crate) struct Io<'a> {
 }
 
 /// One pipeline for frames without lights beside the environment, one for frames with.
-pub(crate) struct Shade([ComputePipeline; 2]);
+pub(crate) struct Shade {
+    /// For materials of which the filter finds all lobes.
+    all: Option<[ComputePipeline; 2]>,
+    others: [ComputePipeline; 2],
+}
+
+/// Constants of `glsl/include/lobes.glsl`, and whether there are materials whose lobes the filter does not find.
+pub(crate) fn lobe_constants(config: &Config, unfiltered: bool) -> [u32; 5] {
+    let layers = config.filter.lobe_layers();
+    let slopes = matches!(config.filter, Filter::Lean | Filter::LeanLobe | Filter::Leadr);
+    let smith = config.filter == Filter::Leadr;
+    [layers.max(1), u32::from(layers > 0), u32::from(slopes), u32::from(smith), u32::from(unfiltered)]
+}
 
 impl Shade {
     /// `levelled` says whether entries of the list stand for cells of levels.
@@ -84,13 +98,16 @@ impl Shade {
             Estimator::BrdfRandom => 2,
             Estimator::Lookup => 3,
         };
-        let mut make = |lights| {
+        let mut make = |lights, unfiltered| {
             let allocated = u32::from(config.allocation != Allocation::Constant);
             let (levelled, widened) = (u32::from(levelled), u32::from(config.widened()));
-            let constants = [constant, lights, levelled, widened, config.sharing_levels(), allocated];
+            let own = [constant, lights, levelled, widened, config.sharing_levels(), allocated];
+            let constants: Vec<_> = own.into_iter().chain(lobe_constants(config, unfiltered)).collect();
             ComputePipeline::new(p.build, p.modules, &INTERFACE, p.bridge, p.slots, &constants)
         };
-        Ok(Self([make(0)?, make(1)?]))
+        let mut both = |unfiltered| -> Result<_> { Ok([make(0, unfiltered)?, make(1, unfiltered)?]) };
+        let others = both(true)?;
+        Ok(Self { others, all: if config.filter.lobe_layers() > 0 { Some(both(false)?) } else { None } })
     }
 
     pub fn record(&self, rec: &mut Recorder<'_>, io: &Io<'_>) {
@@ -99,6 +116,7 @@ impl Shade {
         io.materials.sampled(rec);
         rec.image(io.normals, Access::COMPUTE_SAMPLED);
         rec.image(io.factors, Access::COMPUTE_SAMPLED);
+        rec.image(io.lobes, Access::COMPUTE_SAMPLED);
         rec.buffer(io.arguments, Access::INDIRECT);
         rec.buffer(io.arguments, Access::COMPUTE_READ);
         rec.buffer(io.list, Access::COMPUTE_READ);
@@ -118,16 +136,18 @@ impl Shade {
             Resource::Storage(io.odd.unwrap_or(io.radiance).view),
             Resource::Sampled(io.normals, io.samplers.nearest),
             Resource::Sampled(io.factors, io.samplers.nearest),
+            Resource::Sampled(io.lobes, io.samplers.nearest),
         ];
         let Directions { brdf, environment, light } = io.directions;
         let push = Push { brdf_samples: brdf, environment_samples: environment, light_samples: light };
-        let pipeline = &self.0[usize::from(io.light_count > 0)];
+        let pipelines = self.all.as_ref().filter(|_| !io.materials.maps.unfiltered).unwrap_or(&self.others);
+        let pipeline = &pipelines[usize::from(io.light_count > 0)];
         pipeline.bind(rec, io.bridge, &resources, &push);
         pipeline.dispatch_indirect(rec, io.arguments, 0);
         rec.end();
     }
 
     pub fn retire(self, bag: &mut Retired) {
-        self.0.into_iter().for_each(|p| p.retire(bag));
+        self.all.into_iter().chain([self.others]).flatten().for_each(|p| p.retire(bag));
     }
 }

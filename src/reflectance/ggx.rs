@@ -71,12 +71,12 @@ pub(crate) fn distribution(alpha: f64, h: DVec3) -> f64 {
 }
 
 /// Smith's G1 over twice the cosine: a product of two of these is G / (4 cos cos), finite down to the horizon.
-pub(super) fn masking(alpha: f64, cosine: f64) -> f64 {
+pub(crate) fn masking(alpha: f64, cosine: f64) -> f64 {
     let a = alpha * alpha;
     1.0 / (cosine + (a + (1.0 - a) * cosine * cosine).sqrt())
 }
 
 /// Fresnel reflectance by Schlick's approximation.
-pub(super) fn schlick(f0: DVec3, cosine: f64) -> DVec3 {
+pub(crate) fn schlick(f0: DVec3, cosine: f64) -> DVec3 {
     f0 + (DVec3::ONE - f0) * (1.0 - cosine).clamp(0.0, 1.0).powi(5)
 }

@@ -59,7 +59,7 @@ impl Ladder {
 
     /// The table of step `i`.
     pub fn table(&self, material: &Material, i: usize) -> ImportanceTable {
-        let point = self.points[i.min(self.points.len() - 1)];
+        let point = &self.points[i.min(self.points.len() - 1)];
         if material.maps.is_empty() && point.kernel == 0.0 {
             return ImportanceTable::build(&material.model);
         }
@@ -99,6 +99,7 @@ impl Material {
             specular: mean(self.maps.specular.as_ref(), DVec3::ONE),
             roughness,
             kernel,
+            lobes: None,
         }
     }
 

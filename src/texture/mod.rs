@@ -169,11 +169,6 @@ impl Texture {
         bilinear(*size, uv, |i| self.format.decode(&texels[i * bytes..(i + 1) * bytes]))
     }
 
-    /// The texels of level 0, row by row from the top.
-    pub(crate) fn texels(&self) -> impl Iterator<Item = DVec4> {
-        self.levels[0].texels.chunks_exact(self.format.bytes()).map(|texel| self.format.decode(texel))
-    }
-
     /// Its level 0 at another size, bilinear, with mips of its own.
     fn resampled(&self, size: [u32; 2]) -> Self {
         let texel = |i: usize| {

@@ -126,7 +126,7 @@ pub fn expected_with(
     let image = ReferenceImage { extent, hits, radiance: vec![], coverage: vec![], error: vec![], evaluations: 0 };
     let interior = image.interior();
     let chosen = choose((0..interior.len()).filter(|i| interior[*i]).collect());
-    let shade = |i: &usize| (*i, reference.shade(&image.hits[*i].unwrap()));
+    let shade = |i: &usize| (*i, reference.shade(image.hits[*i].as_ref().unwrap()));
     let estimates: Vec<_> = chosen.par_iter().map(shade).collect();
     Expected {
         extent,

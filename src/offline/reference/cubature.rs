@@ -16,11 +16,13 @@ pub struct Options {
     pub max_evaluations: u64,
     /// How materials are read. What [`Filter::Tk`] adds is a frame's own: its hits have a kernel of 0.
     pub filter: Filter,
+    /// The most look-ups along what a pixel covers of a map.
+    pub anisotropy: u32,
 }
 
 impl Default for Options {
     fn default() -> Self {
-        Self { tolerance: 1e-3, max_evaluations: 5_000_000, filter: Filter::Point }
+        Self { tolerance: 1e-3, max_evaluations: 5_000_000, filter: Filter::Point, anisotropy: 1 }
     }
 }
 

@@ -69,7 +69,7 @@ impl<'a> Reference<'a> {
     /// # Errors
     /// [`Error::InvalidInput`] for an empty extent, a degenerate camera, or an index of a mesh or object out of range.
     pub fn new(world: &'a World, extent: [u32; 2], options: Options) -> Result<Self> {
-        let hits = visibility::trace(world, extent, options.filter)?;
+        let hits = visibility::trace(world, extent, options.filter, options.anisotropy)?;
         let environment = world.environment.as_ref().map(|light| Tree::new(&light.map));
         Ok(Self { world, extent, options, reflectances: None, hits, environment })
     }
@@ -157,11 +157,12 @@ impl ReferenceImage {
     /// see the same surface. Pixels on the image's edge are not interior.
     pub fn interior(&self) -> Vec<bool> {
         let [w, h] = self.extent.map(i64::from);
-        let hit =
-            |x: i64, y: i64| if x < 0 || y < 0 || x >= w || y >= h { None } else { *self.hits.get((y * w + x) as usize)? };
+        let hit = |x: i64, y: i64| {
+            if x < 0 || y < 0 || x >= w || y >= h { None } else { self.hits.get((y * w + x) as usize)?.as_ref() }
+        };
         let interior = |x: i64, y: i64| {
             let Some(centre) = hit(x, y) else { return false };
-            let same = |n: Hit| n.object == centre.object && (n.depth - centre.depth).abs() < INTERIOR_STEP * centre.depth;
+            let same = |n: &Hit| n.object == centre.object && (n.depth - centre.depth).abs() < INTERIOR_STEP * centre.depth;
             (0..9).all(|k| hit(x + k % 3 - 1, y + k / 3 - 1).is_some_and(same))
         };
         (0..w * h).map(|i| interior(i % w, i / w)).collect()

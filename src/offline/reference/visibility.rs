@@ -11,7 +11,7 @@ use glam::{DMat3, DVec2, DVec3, DVec4};
 pub const MIN_COSINE: f64 = 0.02;
 
 /// What a pixel centre sees.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Hit {
     /// Index into [`World::objects`].
     pub object: usize,
@@ -53,11 +53,11 @@ struct Nearest {
 
 /// Row-major hits through the pixel centres of an image of `extent` pixels. Triangles are two-sided. Each triangle is
 /// intersected with the rays of its projected bounding box, so that the cost is linear in triangles and covered pixels.
-/// Materials are read by `filter`.
+/// Materials are read by `filter` with at most `anisotropy` look-ups.
 ///
 /// # Errors
 /// [`Error::InvalidInput`] for an empty extent, a camera without a direction, or an index out of range.
-pub fn trace(world: &World, extent: [u32; 2], filter: Filter) -> Result<Vec<Option<Hit>>> {
+pub fn trace(world: &World, extent: [u32; 2], filter: Filter, anisotropy: u32) -> Result<Vec<Option<Hit>>> {
     let [width, height] = extent.map(|n| n as usize);
     if width == 0 || height == 0 {
         return Err(Error::invalid("extent", "at least 1x1", format!("{width}x{height}")));
@@ -106,7 +106,8 @@ pub fn trace(world: &World, extent: [u32; 2], filter: Filter) -> Result<Vec<Opti
         let object = world.objects.get(found.object)?;
         let depth = -found.distance * ray.dot(axes.z_axis);
         let (uv, footprint) = coordinates(world, extent, &found, [i % width, i / width]).unwrap_or_default();
-        let point = materials.get(object.material)?.filtered_at(moments.get(object.material)?.as_ref(), uv, footprint);
+        let point =
+            materials.get(object.material)?.filtered_at(moments.get(object.material)?.as_ref(), uv, footprint, anisotropy);
         let smooth = shading_normal(object, &found);
         let tangent = tangent(object, &found, smooth);
         let mapped = tangent.map_or(smooth, |(t, side)| {

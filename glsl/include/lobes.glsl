@@ -1,0 +1,255 @@
+// Reflection by the lobes that the filter found at a sample (src/distribution/surface.rs is the f64 twin). A lobe of a material whose
+// lobes are about its normal is a facet: a surface of its own, with the lobe's direction as its normal. Lobes about other directions
+// are one distribution of normals about the mean normal, Gaussians of slopes one about the surface's own. Include after
+// materials.glsl and local.glsl; the includer defines LOBES_BINDING.
+#ifndef LOBES_GLSL
+#define LOBES_GLSL
+#include "oct.glsl"
+#include "sobol.glsl"
+
+// Layers of `lobes_found`, of which one is bound in any case, and whether they hold lobes.
+layout(constant_id = 6) const uint LAYERS = 1u;
+layout(constant_id = 7) const bool LOBED = false;
+// Whether lobes are Gaussians of slopes, and how these are masked: as V-cavities or by Smith's factor.
+layout(constant_id = 8) const bool SLOPES = false;
+layout(constant_id = 9) const bool SMITH = false;
+
+// Directions, which is two layers of slopes: oct.glsl's two numbers, concentration, weight; 0 after the last.
+// Slopes: mean, weight; covariance xx, xy, yy.
+layout(set = 2, binding = LOBES_BINDING) uniform sampler2DArray lobes_found;
+
+// Directions: local mean direction; cosine to the viewer, of facets at least FACING.
+// Slopes, two entries each, in the tangent frame: mean, the density's height, weight.
+vec4 lobe_axis[LAYERS];
+// Directions: alpha squared (GGX), exponent (cosine powers) or concentration; D at the centre; weight; density there of what is drawn.
+// Slopes: inverse of the covariance; the covariance.
+vec4 lobe_shape[LAYERS];
+
+// The sample's lobes, with those.
+struct Lobes {
+    uint count;
+    bool facets;
+    float diffuse; // share of directions that are drawn by the cosine
+};
+
+float mean_of(vec3 c) {
+    return dot(c, vec3(1.0 / 3.0));
+}
+
+// Whether all of a material's own lobes are about its normal, and the sum of their weights.
+bool lobes_upright(Material m, out float total) {
+    bool vmf = m.record.kind.x == REFLECTANCE_VMF;
+    bool upright = true;
+    total = vmf ? 0.0 : 1.0;
+    for (uint i = 0u; i < (vmf ? m.record.kind.z : 0u); ++i) {
+        MaterialRecord lobe = materials[m.record.kind.y + i];
+        total += lobe.albedo.y;
+        upright = upright && lobe.f0.z > 1.0 - 1e-6;
+    }
+    return upright;
+}
+
+Lobes lobes_load(ivec2 p, Local f, Material m) {
+    Lobes l;
+    l.count = 0u;
+    l.facets = true;
+    l.diffuse = 0.0;
+    if (!LOBED) {
+        return l;
+    }
+    float total;
+    l.facets = lobes_upright(m, total);
+    uint kind = m.record.kind.x;
+    bool ggx = kind == REFLECTANCE_GGX, cosine = kind == REFLECTANCE_BLINN_PHONG;
+    if (SLOPES) {
+        for (uint i = 0u; 2u * i + 1u < LAYERS; ++i) {
+            vec4 first = texelFetch(lobes_found, ivec3(p, int(2u * i)), 0);
+            if (first.z <= 0.0) {
+                break;
+            }
+            vec4 second = texelFetch(lobes_found, ivec3(p, int(2u * i) + 1), 0);
+            float determinant = second.x * second.z - second.y * second.y;
+            lobe_axis[2u * i] = vec4(first.xy, 0.5 * INV_PI * inversesqrt(determinant), first.z * total);
+            lobe_shape[2u * i] = vec4(vec3(second.z, -second.y, second.x) / determinant, 0.0);
+            lobe_shape[2u * i + 1u] = second;
+            l.count += 1u;
+        }
+    } else {
+        float area = 0.0;
+        for (uint i = 0u; i < LAYERS; ++i) {
+            vec4 found = texelFetch(lobes_found, ivec3(p, int(i)), 0);
+            if (found.w <= 0.0) {
+                break;
+            }
+            vec3 world = oct_decode(found.xy);
+            vec3 mu = vec3(dot(world, f.x), dot(world, f.y), dot(world, f.z));
+            float kappa = found.z, spread = vmf_spread(kappa), height = vmf_normalisation(kappa);
+            float a = ggx ? clamp(2.0 / kappa, 1e-6, 1.0) : (cosine ? max(1.0 / spread - 2.0, 0.0) : kappa);
+            float peak = ggx ? a * INV_PI : (cosine ? blinn_phong_peak(a) : height);
+            area += found.w * (1.0 - spread) * mu.z;
+            peak /= kind == REFLECTANCE_VMF && l.facets ? max(1.0 - spread, LEAST_PROJECTED_AREA) : 1.0;
+            lobe_axis[i] = vec4(mu, l.facets ? max(dot(mu, f.view), FACING) : f.view.z);
+            lobe_shape[i] = vec4(a, peak, found.w * total, height);
+            l.count += 1u;
+        }
+        float share = l.facets ? 1.0 : 1.0 / max(area, LEAST_PROJECTED_AREA);
+        for (uint i = 0u; i < l.count; ++i) {
+            lobe_shape[i].y *= share;
+        }
+    }
+    float base = mean_of(m.record.albedo.rgb), gloss = mean_of(m.record.f0.rgb) * total;
+    l.diffuse = base > 0.0 ? base / (base + gloss) : 0.0;
+    return l;
+}
+
+// Local directions in the tangent frame, and back.
+vec3 to_tangent(Material m, vec3 v) {
+    return vec3(m.turn.x * v.x - m.turn.y * v.y, (m.turn.y * v.x + m.turn.x * v.y) * m.turn.z, v.z);
+}
+
+vec3 from_tangent(Material m, vec3 v) {
+    v.y *= m.turn.z;
+    return vec3(m.turn.x * v.x + m.turn.y * v.y, m.turn.x * v.y - m.turn.y * v.x, v.z);
+}
+
+// The area of the mean surface of slopes seen from unit w, over the surface's own.
+float slope_facing(vec2 mean, vec3 w) {
+    return w.z - dot(mean, w.xy);
+}
+
+// Smith's Lambda about the mean slope (src/distribution/slope.rs); large where the mean surface faces away.
+float slope_lambda(vec2 mean, vec3 covariance, vec3 w) {
+    float sine = length(w.xy);
+    vec2 along = w.xy / max(sine, 1e-12);
+    float variance = covariance.x * along.x * along.x + 2.0 * covariance.y * along.x * along.y + covariance.z * along.y * along.y;
+    float x = (w.z - sine * dot(mean, along)) / max(sine * sqrt(variance), 1e-12);
+    // The standard normal density, and the probability above x (Abramowitz and Stegun 26.2.17).
+    float gaussian = exp(-0.5 * min(x * x, 80.0)) * 0.3989422804;
+    float t = 1.0 / (1.0 + 0.2316419 * max(x, 0.0));
+    float tail = gaussian * t * (0.31938153 + t * (-0.356563782 + t * (1.781477937 + t * (-1.821255978 + t * 1.330274429))));
+    return x <= 0.0 ? 1e30 : max(gaussian / x - tail, 0.0);
+}
+
+// The material's reflectance times the cosine in rgb, for light from wi above the horizon, h the half vector; in a the density per
+// steradian with which lobes_sample draws wi.
+vec4 lobes_evaluate(Material m, Lobes l, vec3 wi, vec3 wo, vec3 h) {
+    uint kind = m.record.kind.x;
+    bool ggx = kind == REFLECTANCE_GGX, cosine = kind == REFLECTANCE_BLINN_PHONG;
+    float across = dot(wo, h);
+    float specular = 0.0, diffuse = 0.0, density = 0.0, weights = 0.0;
+    if (SLOPES) {
+        vec3 t = to_tangent(m, h), ti = to_tangent(m, wi), to = to_tangent(m, wo);
+        bool up = t.z > 0.0;
+        float inverse = 1.0 / max(t.z, 1e-4), cube = up ? inverse * inverse * inverse : 0.0;
+        vec2 slope = -t.xy * inverse;
+        float cavity = cavity_masking(wi, wo, h);
+        for (uint i = 0u; i < l.count; ++i) {
+            vec4 axis = lobe_axis[2u * i], shape = lobe_shape[2u * i];
+            vec2 d = slope - axis.xy;
+            float square = shape.x * d.x * d.x + 2.0 * shape.y * d.x * d.y + shape.z * d.y * d.y;
+            float drawn = axis.w * axis.z * exp(-0.5 * square) * cube;
+            float open = cavity;
+            if (SMITH) {
+                vec3 covariance = lobe_shape[2u * i + 1u].xyz;
+                float fi = slope_facing(axis.xy, ti), fo = slope_facing(axis.xy, to);
+                float lambdas = slope_lambda(axis.xy, covariance, ti) + slope_lambda(axis.xy, covariance, to);
+                open = fi > 0.0 && fo > 0.0 ? 0.25 / ((1.0 + lambdas) * fi * fo) : 0.0;
+            }
+            specular += drawn * inverse * open * wi.z;
+            diffuse += axis.w * max(dot(normalize(vec3(-axis.xy, 1.0)), ti), 0.0);
+            density += drawn;
+            weights += axis.w;
+        }
+    } else {
+        for (uint i = 0u; i < l.count; ++i) {
+            vec4 axis = lobe_axis[i], shape = lobe_shape[i];
+            vec3 d = h - axis.xyz;
+            float square = dot(d, d), ch = 1.0 - 0.5 * square, sine = square * (1.0 - 0.25 * square);
+            float ci = l.facets ? dot(axis.xyz, wi) : wi.z;
+            float co = axis.w;
+            bool lit = ci > 0.0;
+            ci = lit ? ci : 1.0;
+            float q = shape.x * ch * ch + sine;
+            float exponent = cosine ? 0.5 * shape.x * log_complement(min(sine, 1.0)) : -0.5 * shape.x * square;
+            float normals = shape.y * (ggx ? 1.0 / (q * q) : exp(exponent));
+            normals = (ggx || cosine) && ch <= 0.0 ? 0.0 : normals;
+            float open = ggx ? 1.0 / (ggx_masking(ci, shape.x) * ggx_masking(co, shape.x))
+                             : min(0.25 / (ci * co), 0.5 * max(l.facets ? ch : h.z, 0.0) / (across * max(ci, co)));
+            float lit_weight = lit ? shape.z * ci : 0.0;
+            specular += normals * open * lit_weight;
+            diffuse += lit_weight;
+            density += shape.z * (ggx || cosine ? normals * ch : shape.w * exp(exponent));
+            weights += shape.z;
+        }
+    }
+    density *= 0.25 / (across * weights);
+    density = mix(density, wi.z * INV_PI, l.diffuse);
+    vec3 f = m.record.f0.rgb;
+    vec3 below = m.record.albedo.rgb;
+    if (ggx) {
+        float c = clamp(1.0 - across, 0.0, 1.0), c2 = c * c;
+        f += (1.0 - f) * (c2 * c2 * c);
+        below *= 1.0 - f;
+    }
+    // The weights of a reflectance of lobes are its colour's, not its base's.
+    return vec4(f * specular + below * (INV_PI * diffuse / weights), density);
+}
+
+// A direction of the lobe about mu: of GGX's or a cosine power's density of normals times the cosine, or of the lobe itself.
+vec3 lobes_half(bool ggx, bool cosine, vec3 mu, float a, vec2 u) {
+    float t; // 1 - cosine
+    if (ggx) {
+        float square = a * u.x / max(1.0 - u.x, 1e-7); // of the tangent
+        t = square / (1.0 + square + sqrt(1.0 + square));
+    } else if (cosine) {
+        t = 1.0 - pow(max(1.0 - u.x, 1e-7), 1.0 / (a + 2.0));
+    } else {
+        t = a < 1e-4 ? 2.0 * u.x : min(-log(max(1.0 - u.x * (1.0 - exp(-2.0 * a)), 1e-30)) / a, 2.0);
+    }
+    vec3 x, y;
+    tangent_basis(mu, x, y);
+    vec2 turn = cos_sin((2.0 * u.y - 1.0) * PI) * sqrt(max(t * (2.0 - t), 0.0));
+    return x * turn.x + y * turn.y + mu * (1.0 - t);
+}
+
+// A direction of light from two 32-bit numbers, of which the first also chooses the lobe. It may lie below the horizon.
+vec3 lobes_sample(Material m, Lobes l, vec3 wo, uvec2 number) {
+    vec2 u = vec2(to_unit(number.x), to_unit(number.y));
+    if (u.x < l.diffuse) {
+        float square = u.x / l.diffuse;
+        return vec3(sqrt(square) * cos_sin((2.0 * u.y - 1.0) * PI), sqrt(1.0 - square));
+    }
+    u.x = (u.x - l.diffuse) / (1.0 - l.diffuse);
+    float total = 0.0;
+    for (uint i = 0u; i < l.count; ++i) {
+        total += SLOPES ? lobe_axis[2u * i].w : lobe_shape[i].z;
+    }
+    float left = u.x * total, share = 0.0;
+    uint chosen = 0u;
+    bool found = false;
+    for (uint i = 0u; i < l.count; ++i) {
+        float weight = SLOPES ? lobe_axis[2u * i].w : lobe_shape[i].z;
+        bool here = !found && (left < weight || i + 1u == l.count);
+        chosen = here ? i : chosen;
+        share = here ? left / weight : share;
+        found = found || here;
+        left -= weight;
+    }
+    u.x = clamp(share, 0.0, 0.99999994);
+    vec3 h;
+    if (SLOPES) {
+        vec4 axis = lobe_axis[2u * chosen];
+        vec3 covariance = lobe_shape[2u * chosen + 1u].xyz;
+        vec2 normal = sqrt(-2.0 * log(max(1.0 - u.x, 1e-7))) * cos_sin((2.0 * u.y - 1.0) * PI);
+        float x = sqrt(covariance.x), rest = sqrt(max(covariance.z - covariance.y * covariance.y / covariance.x, 0.0));
+        vec2 slope = axis.xy + vec2(x * normal.x, covariance.y / x * normal.x + rest * normal.y);
+        h = from_tangent(m, normalize(vec3(-slope, 1.0)));
+    } else {
+        uint kind = m.record.kind.x;
+        h = lobes_half(kind == REFLECTANCE_GGX, kind == REFLECTANCE_BLINN_PHONG, lobe_axis[chosen].xyz, lobe_shape[chosen].x, u);
+    }
+    float across = dot(wo, h);
+    return across > 0.0 ? h * (2.0 * across) - wo : vec3(0.0, 0.0, -1.0);
+}
+
+#endif

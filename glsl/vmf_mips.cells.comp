@@ -1,0 +1,52 @@
+#version 460
+// The finest texels that are kept by cells: each the average of the lobes of the base texels that it covers, cell by cell (Xu
+// et al. 2017, section 3.2). A base texel has its lobes as they are. src/distribution/filter.rs is the f64 twin.
+#include "cover.glsl"
+#include "moments.glsl"
+
+layout(local_size_x = 8, local_size_y = 8) in;
+// FILTER_* of moments.glsl.
+layout(constant_id = 0) const uint FILTER = 0u;
+layout(set = 2, binding = 0, rgba32f) uniform readonly image2DArray lobes;
+layout(set = 2, binding = 1, rgba32f) uniform writeonly image2DArray cells;
+layout(push_constant) uniform Push {
+    vec4 weights;
+    uint count;
+    int lobe_layer; // the first lobe's
+    int cell_layer;
+};
+
+const uint COUNT = FILTER == FILTER_VMF4 ? 4u : CELLS;
+
+void main() {
+    ivec2 p = ivec2(gl_GlobalInvocationID.xy), size = imageSize(cells).xy, from = imageSize(lobes).xy;
+    if (any(greaterThanEqual(p, size))) {
+        return;
+    }
+    vec4 sums[CELLS];
+    float spreads[CELLS];
+    for (uint i = 0u; i < CELLS; ++i) {
+        sums[i] = vec4(0.0);
+        spreads[i] = 0.0;
+    }
+    Cover columns = cover(p.x, from.x, size.x), rows = cover(p.y, from.y, size.y);
+    for (int y = rows.first; y <= rows.last; ++y) {
+        for (int x = columns.first; x <= columns.last; ++x) {
+            float share = cover_share(columns, x, from.x, size.x) * cover_share(rows, y, from.y, size.y);
+            for (uint i = 0u; i < count; ++i) {
+                vec4 lobe = imageLoad(lobes, ivec3(x, y, lobe_layer + int(i)));
+                float weight = share * weights[i];
+                uint cell = moments_cell(COUNT, vec3(lobe.xy, 1.0 - lobe.z));
+                sums[cell] += vec4(lobe.xyz, 1.0) * weight;
+                spreads[cell] += lobe.w * weight;
+            }
+        }
+    }
+    for (uint i = 0u; i < COUNT; ++i) {
+        imageStore(cells, ivec3(p, cell_layer + int(i)), sums[i]);
+    }
+    if (FILTER == FILTER_VMF) {
+        imageStore(cells, ivec3(p, cell_layer + int(CELLS)), vec4(spreads[0], spreads[1], spreads[2], spreads[3]));
+        imageStore(cells, ivec3(p, cell_layer + int(CELLS) + 1), vec4(spreads[4], spreads[5], spreads[6], spreads[7]));
+    }
+}

@@ -1,0 +1,148 @@
+//! Reflection by the lobes that a filter finds at a sample, the twin of `glsl/include/lobes.glsl`.
+//!
+//! Where a material's lobes are about its normal, a lobe that is found is a *facet*: a surface of its own with the lobe's direction
+//! for a normal, so that its masking, its base and its cosine are those of normals that the pixel has, and not of their mean.
+//! Lobes about other directions are one distribution of normals about the mean normal; Gaussians of slopes (LEAN, LEADR) are one
+//! about the surface's own.
+
+use crate::distribution::effective;
+use crate::distribution::mixture::{Masking, Mixture};
+use crate::distribution::vmf::{self, Lobe};
+use crate::material::{LEAST_ALPHA, MOST_CONCENTRATION};
+use crate::reflectance::vmf::LEAST_PROJECTED_AREA;
+use crate::reflectance::{BlinnPhong, Model, Reflectance, cavity, ggx};
+use glam::{DVec2, DVec3};
+use std::f64::consts::PI;
+
+/// The least cosine of a facet to the viewer: one that faces away counts as bent to there, as shading normals are.
+const FACING: f64 = 0.02;
+
+/// Lobes found at a place of a material.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FoundLobes {
+    /// The shading normal, unit, in the tangent frame: the mean of the normals, or the frame's own for slopes.
+    pub normal: DVec3,
+    /// In the tangent frame, of weights that sum to 1.
+    pub lobes: Mixture,
+    /// Whether the material's own lobes are all about its normal.
+    pub upright: bool,
+    /// How they are masked, if they are slopes.
+    pub masking: Masking,
+}
+
+impl FoundLobes {
+    /// The same with `kernel` added to every lobe's 2 / concentration, that is half of it to every variance of slopes.
+    pub fn widened(mut self, kernel: f64) -> Self {
+        match &mut self.lobes {
+            Mixture::Vmf(lobes) => lobes.iter_mut().for_each(|l| l.kappa /= 1.0 + 0.5 * l.kappa * kernel),
+            Mixture::Slopes(lobes) => {
+                lobes.iter_mut().for_each(|l| [0, 2].into_iter().for_each(|i| l.covariance[i] += 0.5 * kernel));
+            }
+        }
+        self
+    }
+}
+
+/// A model with the lobes that were found in the place of its own, in the frame about the shading normal.
+#[derive(Clone, Debug)]
+pub struct Surface {
+    /// With the colours of its maps.
+    model: Model,
+    lobes: Mixture,
+    facets: bool,
+    masking: Masking,
+    /// Factor on what is specular, and albedo below: of vMF lobes, which have none of their own.
+    specular: DVec3,
+    base: DVec3,
+}
+
+impl Surface {
+    /// `model` with `found`. `specular` and `base` are a factor on, and the albedo under, vMF lobes.
+    pub fn new(model: Model, found: &FoundLobes, specular: DVec3, base: DVec3) -> Self {
+        let frame = effective::about(found.normal).transpose();
+        let lobes = match &found.lobes {
+            Mixture::Vmf(lobes) => Mixture::Vmf(lobes.iter().map(|l| Lobe { mu: frame * l.mu, ..*l }).collect()),
+            slopes @ Mixture::Slopes(_) => slopes.clone(),
+        };
+        let total = match &model {
+            Model::Vmf(vmf) => vmf.lobes().iter().map(|l| l.weight).sum(),
+            _ => 1.0,
+        };
+        let (specular, base) = match &model {
+            Model::Ggx(g) => (g.f0, g.albedo),
+            Model::BlinnPhong(b) => (b.specular, b.albedo),
+            Model::Vmf(_) | Model::Table(_) | Model::Turned(_) => (specular * total, base),
+        };
+        Self { model, lobes, facets: found.upright, masking: found.masking, specular, base }
+    }
+
+    /// Fresnel reflectance, and the base below it.
+    fn colours(&self, cosine: f64) -> (DVec3, DVec3) {
+        if matches!(self.model, Model::Ggx(_)) {
+            let fresnel = ggx::schlick(self.specular, cosine);
+            (fresnel, self.base * (DVec3::ONE - fresnel))
+        } else {
+            (self.specular, self.base)
+        }
+    }
+
+    /// `D G / (4 cos cos)` of a facet with cosines `ci` and `co` to light and viewer; `square` is the squared distance of the half
+    /// vector from its direction, which sharp lobes need, `across` the half vector's cosine to the viewer.
+    fn facet(&self, kappa: f64, [ci, co]: [f64; 2], square: f64, across: f64) -> f64 {
+        let cosine = 1.0 - 0.5 * square;
+        let h = DVec3::new((square * (1.0 - 0.25 * square)).max(0.0).sqrt(), 0.0, cosine);
+        let cavity = (0.25 / (ci * co)).min(0.5 * cosine.max(0.0) / (across * ci.max(co)));
+        match &self.model {
+            Model::Ggx(_) if cosine > 0.0 => {
+                let alpha = (2.0 / kappa).sqrt().clamp(LEAST_ALPHA, 1.0);
+                ggx::distribution(alpha, h) * ggx::masking(alpha, ci) * ggx::masking(alpha, co)
+            }
+            Model::BlinnPhong(b) if cosine > 0.0 => {
+                let exponent = (1.0 / vmf::spread(kappa) - 2.0).clamp(0.0, MOST_CONCENTRATION);
+                BlinnPhong { exponent, ..*b }.distribution(h) * cavity
+            }
+            Model::Vmf(_) => {
+                let height = vmf::normalisation(kappa) / vmf::mean_cosine(kappa).max(LEAST_PROJECTED_AREA);
+                height * (-0.5 * kappa * square).exp() * cavity
+            }
+            _ => 0.0,
+        }
+    }
+}
+
+impl Reflectance for Surface {
+    fn evaluate(&self, wi: DVec3, wo: DVec3) -> DVec3 {
+        if wi.z <= 0.0 || wo.z <= 0.0 {
+            return DVec3::ZERO;
+        }
+        let h = (wi + wo).normalize();
+        let across = wo.dot(h);
+        let (fresnel, below) = self.colours(across);
+        let (specular, lit) = match &self.lobes {
+            Mixture::Vmf(lobes) if self.facets => {
+                let (mut specular, mut lit) = (0.0, 0.0);
+                for lobe in lobes {
+                    let ci = lobe.mu.dot(wi);
+                    if ci <= 0.0 {
+                        continue;
+                    }
+                    let cosines = [ci, lobe.mu.dot(wo).max(FACING)];
+                    specular += lobe.weight * ci * self.facet(lobe.kappa, cosines, (h - lobe.mu).length_squared(), across);
+                    lit += lobe.weight * ci;
+                }
+                (specular / wi.z, lit / wi.z)
+            }
+            Mixture::Vmf(_) => (self.lobes.distribution(h) * cavity::masking(wi, wo, h), 1.0),
+            Mixture::Slopes(lobes) => {
+                let lit = |b: DVec2| (-b).extend(1.0).normalize().dot(wi).max(0.0);
+                let lit = lobes.iter().map(|l| l.weight * lit(l.mean)).sum::<f64>();
+                (self.lobes.specular(wi, wo, self.masking), lit / wi.z)
+            }
+        };
+        fresnel * specular + below * (lit / PI)
+    }
+
+    fn isotropic(&self) -> bool {
+        false
+    }
+}
