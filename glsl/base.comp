@@ -21,7 +21,7 @@ layout(local_size_x = 8, local_size_y = 8) in;
 layout(constant_id = 1) const bool LOCAL_LIGHTS = false;
 
 // Where the filter finds lobes: whether there are materials beside, which stay as they are.
-layout(constant_id = 10) const bool UNFILTERED = true;
+layout(constant_id = 10) const uint UNFILTERED = 1u;
 
 layout(set = 2, binding = 1) uniform sampler2D normals;  // as the filter pass writes them
 layout(set = 2, binding = 2) uniform usampler2D factors;
@@ -36,10 +36,10 @@ vec3 reflected_light(Local f, Material m, Lobes l, vec3 w, vec3 power) {
     bool above = wi.z > 0.0;
     wi = above ? wi : f.view;
     vec3 h = normalize(wi + f.view), value = vec3(0.0);
-    if (UNFILTERED) {
+    if (UNFILTERED != 0u) {
         value = material_evaluate(m, wi, f.view, h) * wi.z;
     }
-    if (LOBED) {
+    if (LOBED != 0u) {
         vec3 found = lobes_evaluate(m, l, wi, f.view, h).rgb;
         value = l.count > 0u ? found : value;
     }
@@ -60,12 +60,12 @@ void main() {
     Lobes l = lobes_load(p, f, m);
 
     vec3 sum = reflected_diffuse(m, f.view) * prefiltered_irradiance(f.z);
-    uint own = LOBED && l.count > 0u ? 0u : reflected_count(m);
-    for (uint i = 0u; UNFILTERED && i < own; ++i) {
+    uint own = LOBED != 0u && l.count > 0u ? 0u : reflected_count(m);
+    for (uint i = 0u; UNFILTERED != 0u && i < own; ++i) {
         ReflectedLobe lobe = reflected_lobe(m, i, f.view);
         sum += lobe.weight * prefiltered(to_world(f, lobe.direction), lobe.kappa);
     }
-    for (uint i = 0u; LOBED && i < l.count; ++i) {
+    for (uint i = 0u; LOBED != 0u && i < l.count; ++i) {
         ReflectedLobe lobe = reflected_found(m, l, i, f.view);
         sum += lobe.weight * prefiltered(to_world(f, lobe.direction), lobe.kappa);
     }

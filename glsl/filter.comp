@@ -118,7 +118,7 @@ vec4 fetch(uint classes, uint code, uint layer, vec2 uv, float level) {
 // The mean over what a pixel covers.
 vec4 look_up(uint classes, uint code, uint layer, vec2 uv, Reach r) {
     vec4 sum = fetch(classes, code, layer, reach_tap(r, uv, 0.0), r.level);
-    for (float i = 1.0; ANISOTROPY > 1u && i < r.taps; ++i) {
+    for (float i = 1.0; ANISOTROPY != 1u && i < r.taps; ++i) {
         sum += fetch(classes, code, layer, reach_tap(r, uv, i), r.level);
     }
     return sum / r.taps;
@@ -198,8 +198,6 @@ void keep_slopes(ivec2 p, inout Found f, vec4 first, float product, float weight
     f.sharpest = max(f.sharpest, 1.0 / min(variance.x, variance.y));
 }
 
-const uint COUNT = FILTER == FILTER_VMF4 ? 4u : CELLS;
-
 // Weight times characteristic vector, weight; weight times the spread of what is in it.
 struct Cell {
     vec4 sum;
@@ -235,7 +233,7 @@ void gather(MapRecord record, vec2 uv, Reach r, uint lobe_layer, out Cell cells[
     float coarse = min(r.level, 1.0), level = max(r.level - 1.0, 0.0);
     for (float tap = 0.0; tap < r.taps; ++tap) {
         vec2 at = reach_tap(r, uv, tap);
-        for (uint i = 0u; i < COUNT; ++i) {
+        for (uint i = 0u; i < filter_cells(FILTER); ++i) {
             cells[i].sum += fetch(CELL_CLASSES, record.cells, i, at, level) * (coarse / r.taps);
         }
         if (FILTER == FILTER_VMF) {
@@ -253,7 +251,7 @@ void gather(MapRecord record, vec2 uv, Reach r, uint lobe_layer, out Cell cells[
             for (uint j = 0u; j < record.count; ++j) {
                 vec4 lobe = fetch(MOMENT_CLASSES, record.moments, lobe_layer + j, vec2(centre.x, 1.0 - centre.y), 0.0);
                 float weight = record.weights[j] * share.x * share.y * ((1.0 - coarse) / r.taps);
-                uint cell = moments_cell(COUNT, vec3(lobe.xy, 1.0 - lobe.z));
+                uint cell = moments_cell(filter_cells(FILTER), vec3(lobe.xy, 1.0 - lobe.z));
                 cells[cell].sum += vec4(lobe.xyz, 1.0) * weight;
                 cells[cell].spread += lobe.w * weight;
             }
@@ -269,7 +267,7 @@ void decode(ivec2 p, MapRecord record, vec2 uv, vec4 footprint, inout Found f) {
         Cell cells[CELLS];
         gather(record, uv, r, layer, cells);
         Cell all = Cell(vec4(0.0), 0.0);
-        for (uint i = 0u; i < COUNT; ++i) {
+        for (uint i = 0u; i < filter_cells(FILTER); ++i) {
             all = both(all, cells[i]);
         }
         f.mean = all.sum.xyz / all.sum.w;
@@ -284,7 +282,7 @@ void decode(ivec2 p, MapRecord record, vec2 uv, vec4 footprint, inout Found f) {
                 keep_cell(p, f, cells[2u * i + 1u], (1.0 - one) * (1.0 - kept));
             }
         } else {
-            for (uint i = 0u; i < COUNT; ++i) {
+            for (uint i = 0u; i < filter_cells(FILTER); ++i) {
                 keep_cell(p, f, cells[i], 1.0);
             }
         }
@@ -342,7 +340,7 @@ void main() {
         vec3 bent = normalize(t.xyz * local.x + cross(n, t.xyz) * (t.w * local.y) + n * local.z);
         n = record.places.z != 0u && t.w != 0.0 ? bent : n;
     }
-    if (LOBES > 0u) {
+    if (LOBES != 0u) {
         vec3 x, y;
         tangent_basis(n, x, y);
         x = t.w != 0.0 ? t.xyz : x;

@@ -33,7 +33,7 @@ layout(constant_id = 4) const int SHARING = 0;
 // Whether entries carry a number of directions.
 layout(constant_id = 5) const bool ALLOCATED = false;
 // Where the filter finds lobes: whether there are materials beside, which stay as they are.
-layout(constant_id = 10) const bool UNFILTERED = true;
+layout(constant_id = 10) const uint UNFILTERED = 1u;
 
 layout(set = 2, binding = 3, std430) readonly buffer Arguments {
     uint groups_x, groups_y, groups_z;
@@ -97,7 +97,7 @@ struct Surface {
 };
 
 bool lobed(Surface s) {
-    return LOBED && (!UNFILTERED || s.lobes.count > 0u);
+    return LOBED != 0u && (s.lobes.count > 0u || UNFILTERED == 0u);
 }
 
 // Reflectance times the cosine for light from local wi above the horizon, h the half vector, and in a the density per steradian
@@ -105,11 +105,11 @@ bool lobed(Surface s) {
 vec4 reflected(Surface s, vec3 wi, vec3 h) {
     vec3 wo = s.frame.view;
     vec4 of_lobes = vec4(0.0);
-    if (LOBED) {
+    if (LOBED != 0u) {
         of_lobes = lobes_evaluate(s.material, s.lobes, wi, wo, h);
     }
     vec4 whole = vec4(0.0);
-    if (UNFILTERED) {
+    if (UNFILTERED != 0u) {
         whole = vec4(material_evaluate(s.material, wi, wo, h) * wi.z, material_density(s.material, h) * 0.25 / dot(wo, h));
     }
     return lobed(s) ? of_lobes : whole;
@@ -120,7 +120,7 @@ vec4 reflected(Surface s, vec3 wi, vec3 h) {
 vec3 brdf_contribution(Surface s, vec3 p, uvec2 u) {
     vec3 wi = vec3(0.0, 0.0, -1.0), h = vec3(0.0, 0.0, 1.0);
     float drawn = 0.0; // density per steradian of wi; 0 if it is that of the weights
-    if (UNFILTERED) {
+    if (UNFILTERED != 0u) {
         vec4 half_vector = material_sample(s.material, u);
         float cos_d = dot(s.frame.view, half_vector.xyz);
         h = half_vector.xyz;

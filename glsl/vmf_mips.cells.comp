@@ -16,8 +16,6 @@ layout(push_constant) uniform Push {
     int cell_layer;
 };
 
-const uint COUNT = FILTER == FILTER_VMF4 ? 4u : CELLS;
-
 void main() {
     ivec2 p = ivec2(gl_GlobalInvocationID.xy), size = imageSize(cells).xy, from = imageSize(lobes).xy;
     if (any(greaterThanEqual(p, size))) {
@@ -36,13 +34,13 @@ void main() {
             for (uint i = 0u; i < count; ++i) {
                 vec4 lobe = imageLoad(lobes, ivec3(x, y, lobe_layer + int(i)));
                 float weight = share * weights[i];
-                uint cell = moments_cell(COUNT, vec3(lobe.xy, 1.0 - lobe.z));
+                uint cell = moments_cell(filter_cells(FILTER), vec3(lobe.xy, 1.0 - lobe.z));
                 sums[cell] += vec4(lobe.xyz, 1.0) * weight;
                 spreads[cell] += lobe.w * weight;
             }
         }
     }
-    for (uint i = 0u; i < COUNT; ++i) {
+    for (uint i = 0u; i < filter_cells(FILTER); ++i) {
         imageStore(cells, ivec3(p, cell_layer + int(i)), sums[i]);
     }
     if (FILTER == FILTER_VMF) {

@@ -9,10 +9,10 @@
 
 // Layers of `lobes_found`, of which one is bound in any case, and whether they hold lobes.
 layout(constant_id = 6) const uint LAYERS = 1u;
-layout(constant_id = 7) const bool LOBED = false;
+layout(constant_id = 7) const uint LOBED = 0u;
 // Whether lobes are Gaussians of slopes, and how these are masked: as V-cavities or by Smith's factor.
-layout(constant_id = 8) const bool SLOPES = false;
-layout(constant_id = 9) const bool SMITH = false;
+layout(constant_id = 8) const uint SLOPES = 0u;
+layout(constant_id = 9) const uint SMITH = 0u;
 
 // Directions, which is two layers of slopes: oct.glsl's two numbers, concentration, weight; 0 after the last.
 // Slopes: mean, weight; covariance xx, xy, yy.
@@ -54,14 +54,14 @@ Lobes lobes_load(ivec2 p, Local f, Material m) {
     l.count = 0u;
     l.facets = true;
     l.diffuse = 0.0;
-    if (!LOBED) {
+    if (LOBED == 0u) {
         return l;
     }
     float total;
     l.facets = lobes_upright(m, total);
     uint kind = m.record.kind.x;
     bool ggx = kind == REFLECTANCE_GGX, cosine = kind == REFLECTANCE_BLINN_PHONG;
-    if (SLOPES) {
+    if (SLOPES != 0u) {
         for (uint i = 0u; 2u * i + 1u < LAYERS; ++i) {
             vec4 first = texelFetch(lobes_found, ivec3(p, int(2u * i)), 0);
             if (first.z <= 0.0) {
@@ -137,7 +137,7 @@ vec4 lobes_evaluate(Material m, Lobes l, vec3 wi, vec3 wo, vec3 h) {
     bool ggx = kind == REFLECTANCE_GGX, cosine = kind == REFLECTANCE_BLINN_PHONG;
     float across = dot(wo, h);
     float specular = 0.0, diffuse = 0.0, density = 0.0, weights = 0.0;
-    if (SLOPES) {
+    if (SLOPES != 0u) {
         vec3 t = to_tangent(m, h), ti = to_tangent(m, wi), to = to_tangent(m, wo);
         bool up = t.z > 0.0;
         float inverse = 1.0 / max(t.z, 1e-4), cube = up ? inverse * inverse * inverse : 0.0;
@@ -149,7 +149,7 @@ vec4 lobes_evaluate(Material m, Lobes l, vec3 wi, vec3 wo, vec3 h) {
             float square = shape.x * d.x * d.x + 2.0 * shape.y * d.x * d.y + shape.z * d.y * d.y;
             float drawn = axis.w * axis.z * exp(-0.5 * square) * cube;
             float open = cavity;
-            if (SMITH) {
+            if (SMITH != 0u) {
                 vec3 covariance = lobe_shape[2u * i + 1u].xyz;
                 float fi = slope_facing(axis.xy, ti), fo = slope_facing(axis.xy, to);
                 float lambdas = slope_lambda(axis.xy, covariance, ti) + slope_lambda(axis.xy, covariance, to);
@@ -222,13 +222,13 @@ vec3 lobes_sample(Material m, Lobes l, vec3 wo, uvec2 number) {
     u.x = (u.x - l.diffuse) / (1.0 - l.diffuse);
     float total = 0.0;
     for (uint i = 0u; i < l.count; ++i) {
-        total += SLOPES ? lobe_axis[2u * i].w : lobe_shape[i].z;
+        total += SLOPES != 0u ? lobe_axis[2u * i].w : lobe_shape[i].z;
     }
     float left = u.x * total, share = 0.0;
     uint chosen = 0u;
     bool found = false;
     for (uint i = 0u; i < l.count; ++i) {
-        float weight = SLOPES ? lobe_axis[2u * i].w : lobe_shape[i].z;
+        float weight = SLOPES != 0u ? lobe_axis[2u * i].w : lobe_shape[i].z;
         bool here = !found && (left < weight || i + 1u == l.count);
         chosen = here ? i : chosen;
         share = here ? left / weight : share;
@@ -237,7 +237,7 @@ vec3 lobes_sample(Material m, Lobes l, vec3 wo, uvec2 number) {
     }
     u.x = clamp(share, 0.0, 0.99999994);
     vec3 h;
-    if (SLOPES) {
+    if (SLOPES != 0u) {
         vec4 axis = lobe_axis[2u * chosen];
         vec3 covariance = lobe_shape[2u * chosen + 1u].xyz;
         vec2 normal = sqrt(-2.0 * log(max(1.0 - u.x, 1e-7))) * cos_sin((2.0 * u.y - 1.0) * PI);

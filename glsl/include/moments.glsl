@@ -44,6 +44,10 @@ bool filter_of_cells(uint filtering) {
     return filtering == FILTER_VMF4 || filtering == FILTER_VMF8 || filtering == FILTER_VMF;
 }
 
+uint filter_cells(uint filtering) {
+    return filtering == FILTER_VMF4 ? 4u : CELLS;
+}
+
 // Whether lobes that are not of one direction are merged.
 bool filter_merges(uint filtering) {
     return filtering == FILTER_TOKSVIG || filtering == FILTER_LEAN || filtering == FILTER_LEADR || filtering == FILTER_VMF1;

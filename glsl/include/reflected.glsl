@@ -62,7 +62,7 @@ ReflectedLobe reflected_found(Material m, Lobes l, uint i, vec3 wo) {
     bool ggx = kind == REFLECTANCE_GGX, cosine = kind == REFLECTANCE_BLINN_PHONG;
     vec3 centre;
     float kappa, peak, weight; // of half vectors
-    if (SLOPES) {
+    if (SLOPES != 0u) {
         vec4 axis = lobe_axis[2u * i];
         vec3 covariance = lobe_shape[2u * i + 1u].xyz;
         float square = 1.0 + dot(axis.xy, axis.xy); // 1 / cos^2
@@ -84,10 +84,10 @@ ReflectedLobe reflected_found(Material m, Lobes l, uint i, vec3 wo) {
     cosine_to = seen ? cosine_to : 1.0;
     vec3 wi = seen ? lobe.direction : wo;
     lobe.kappa = kappa / (4.0 * cosine_to);
-    bool facet = !SLOPES && l.facets;
+    bool facet = SLOPES == 0u && l.facets;
     float ci = facet ? cosine_to : wi.z;
     float open = facet ? 0.25 / (ci * ci) : cavity_masking(wi, wo, centre);
-    if (ggx && !SLOPES) {
+    if (ggx && SLOPES == 0u) {
         float masking = ggx_masking(ci, lobe_shape[i].x);
         open = 1.0 / (masking * masking);
     }
