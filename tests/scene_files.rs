@@ -435,7 +435,18 @@ fn builtin_scenes_resolve() {
     assert_eq!((plane("lights", "[]").lights.len(), plane("environment.intensity", "0").lights.len()), (0, 1));
     assert_eq!(plane("environment.intensity", "0").environment.unwrap().intensity, 0.0);
     // Those that need fetched files parse.
-    for name in ["bunny-city", "dragon", "armadillo", "tiles", "bark", "bumpy-bunny", "dragon-normals"] {
+    for name in [
+        "bunny-city",
+        "dragon",
+        "armadillo",
+        "tiles",
+        "bark",
+        "bumpy-bunny",
+        "dragon-normals",
+        "copper-knot",
+        "leather",
+        "wet-stones",
+    ] {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("scenes/{name}.toml"));
         load(&path, &[]).unwrap();
     }
