@@ -206,7 +206,7 @@ fn thread(x: usize, y: usize) -> Thread {
     let (radius, angle) = (u.hypot(v), v.atan2(u));
     let flower = radius < 0.45 + 0.22 * (6.0 * angle).cos() && radius > 0.12;
     let stem = (u - 0.25 * (1.5 * TAU * v).sin()).abs() < 0.045 || (0.8..0.88).contains(&radius);
-    match (flower || stem, x / 2 % 3 == 0, y / 2 % 3 == 0) {
+    match (flower || stem, (x / 2).is_multiple_of(3), (y / 2).is_multiple_of(3)) {
         (true, _, true) => Thread::Silk,
         (true, _, false) => Thread::Gold,
         (false, true, _) => Thread::Weft,
