@@ -16,13 +16,19 @@ void main() {
         return;
     }
     vec4 sum = vec4(0.0);
+    uint missing = 0u; // bit k: sample k shows the environment
     for (int k = 0; k < side * side; ++k) {
         ivec2 p = pixel * side + ivec2(k % side, k / side);
-        if (gbuffer_covered(p)) {
-            sum += vec4(texelFetch(radiance, p, 0).rgb, 1.0);
-        } else if (frame.extent.w != 0u) {
-            sum.rgb += environment_lookup(normalize(frame_ray(p))).rgb;
-        }
+        bool covered = gbuffer_covered(p);
+        // What no surface is at may be undefined.
+        sum += covered ? vec4(texelFetch(radiance, p, 0).rgb, 1.0) : vec4(0.0);
+        missing |= covered || frame.extent.w == 0u ? 0u : 1u << k;
+    }
+    // A loop, as it ends where a branch would be run for nothing.
+    while (missing != 0u) {
+        int k = findLSB(missing);
+        missing &= missing - 1u;
+        sum.rgb += environment_lookup(normalize(frame_ray(pixel * side + ivec2(k % side, k / side)))).rgb;
     }
     imageStore(resolved, pixel, sum / float(side * side));
 }

@@ -319,7 +319,19 @@ fn layers_land_in_the_exr_under_their_names() {
 fn built_in_scenes_are_listed_and_render_without_a_validation_message() {
     let folder = Folder::new("scenes");
     let listing = folder.run(&["scenes"]).quiet();
-    let names = ["trio", "sphere", "bumpy-sphere", "torus-knot", "maps", "waves", "furnace"];
+    let names = [
+        "trio",
+        "sphere",
+        "bumpy-sphere",
+        "torus-knot",
+        "maps",
+        "waves",
+        "furnace",
+        "cloth-plane",
+        "atlas-plane",
+        "pillow",
+        "hall",
+    ];
     for name in names {
         let line = listing.lines().find(|line| line.split_whitespace().next() == Some(name));
         assert!(line.is_some_and(|line| line.split_whitespace().count() > 4), "{name} in {listing}");

@@ -123,7 +123,9 @@ fn passes_are_as_their_twin() {
 
 #[test]
 fn built_in_scenes_have_no_hole() {
-    for (name, _) in Scene::builtin_names() {
+    // The tilted planes are one picture of eight materials.
+    let alike = |name: &str| name == "microgeometry" || name.ends_with("-plane") && name != "checker-plane";
+    for (name, _) in Scene::builtin_names().into_iter().filter(|(name, _)| !alike(name)) {
         let world = scene(name);
         for size in SIZES {
             against_the_twin(&world, &Config { rate: Rate::Given, ..config(size, Estimator::Brdf, 1) }, 1);

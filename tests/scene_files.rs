@@ -399,7 +399,27 @@ fn builtin_scenes_resolve() {
     let names = Scene::builtin_names();
     assert_eq!(
         names.iter().map(|n| n.0).collect::<Vec<_>>(),
-        ["trio", "sphere", "bumpy-sphere", "torus-knot", "crowd", "maps", "waves", "furnace"]
+        [
+            "trio",
+            "sphere",
+            "bumpy-sphere",
+            "torus-knot",
+            "crowd",
+            "maps",
+            "waves",
+            "furnace",
+            "checker-plane",
+            "cloth-plane",
+            "bumps-plane",
+            "disk-plane",
+            "dunes-plane",
+            "flake-plane",
+            "atlas-plane",
+            "microgeometry",
+            "pillow",
+            "tablecloth",
+            "hall"
+        ]
     );
     for (name, line) in names {
         assert!(line.len() > 20 && line.ends_with('.'), "{name}: {line}");
@@ -410,8 +430,23 @@ fn builtin_scenes_resolve() {
     }
     let trio = Scene::load("trio", &[("objects.2.material".into(), "paint".into())]).unwrap().resolve().unwrap();
     assert_eq!(trio.materials[trio.objects[2].material].name, "paint");
+    // A plane's light and surroundings can be had one without the other.
+    let plane = |path: &str, value: &str| Scene::load("flake-plane", &[(path.into(), value.into())]).unwrap().resolve().unwrap();
+    assert_eq!((plane("lights", "[]").lights.len(), plane("environment.intensity", "0").lights.len()), (0, 1));
+    assert_eq!(plane("environment.intensity", "0").environment.unwrap().intensity, 0.0);
     // Those that need fetched files parse.
-    for name in ["bunny-city", "dragon", "armadillo", "tiles", "bark"] {
+    for name in [
+        "bunny-city",
+        "dragon",
+        "armadillo",
+        "tiles",
+        "bark",
+        "bumpy-bunny",
+        "dragon-normals",
+        "copper-knot",
+        "leather",
+        "wet-stones",
+    ] {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("scenes/{name}.toml"));
         load(&path, &[]).unwrap();
     }

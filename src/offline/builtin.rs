@@ -7,7 +7,7 @@ use crate::offline::mesh::{Mesh, shapes};
 use crate::sampling::LatLong;
 
 /// Names of the built-in meshes.
-pub const MESHES: [&str; 5] = ["sphere", "bumpy-sphere", "torus-knot", "plane", "cloth"];
+pub const MESHES: [&str; 7] = ["sphere", "bumpy-sphere", "torus-knot", "plane", "cloth", "pillow", "cylinder"];
 
 /// Names of the built-in environments. `cosine-K` holds one frequency, of K radians a radian.
 pub const ENVIRONMENTS: [&str; 6] = ["sun-sky", "studio", "constant", "cosine-64", "cosine-128", "cosine-200"];
@@ -19,7 +19,7 @@ pub const DEFAULT_DETAIL: u32 = 256;
 pub const DEFAULT_WIDTH: u32 = 1024;
 
 /// The mesh `name`, with `detail` segments around the sphere and in proportion on the other shapes. All are centred, fit
-/// the unit sphere (`plane` and `cloth` are 2x2 in y = 0, facing +Y), are wound counter-clockwise and carry UVs.
+/// the unit sphere (`plane` and `cloth` are 2x2 in y = 0, facing +Y; `cylinder` is an upright tube without ends), are wound counter-clockwise and carry UVs.
 ///
 /// # Errors
 /// [`Error::Argument`] for an unknown name or a `detail` outside 8 to 4096.
@@ -33,6 +33,8 @@ pub fn mesh(name: &str, detail: u32) -> Result<Mesh> {
         "torus-knot" => shapes::torus_knot(detail),
         "plane" => shapes::plane(detail),
         "cloth" => shapes::cloth(detail),
+        "pillow" => shapes::pillow(detail),
+        "cylinder" => shapes::cylinder(detail),
         _ => return Err(Error::argument("built-in mesh", MESHES.join(", "), name)),
     })
 }
@@ -91,7 +93,7 @@ mod tests {
 
     #[test]
     fn solids_fit_the_unit_sphere_and_are_closed() {
-        for (name, least) in [("sphere", 0.99999), ("bumpy-sphere", 0.9), ("torus-knot", 0.99)] {
+        for (name, least) in [("sphere", 0.99999), ("bumpy-sphere", 0.9), ("torus-knot", 0.99), ("pillow", 0.99999)] {
             let m = mesh(name, 64).unwrap();
             let radius = m.positions.iter().map(|p| Vec3::from(*p).length()).fold(0.0, f32::max);
             assert!((least..=1.00001).contains(&radius), "{name}: {radius}");

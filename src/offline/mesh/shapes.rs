@@ -3,7 +3,7 @@
 
 use crate::offline::mesh::Mesh;
 use glam::{DVec2, DVec3, dvec2, dvec3};
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::{FRAC_1_SQRT_2, PI, TAU};
 
 /// Position and unit normal of a surface at `(u, v)` in the unit square.
 type Point = (DVec3, DVec3);
@@ -88,6 +88,39 @@ pub(crate) fn cloth(detail: u32) -> Mesh {
     })
 }
 
+/// Two sheets over the square of half side sqrt(1/2) in x and z that meet at its edges, up to 0.2 away from y = 0; each has all
+/// of the texture, `detail` cells a side.
+pub(crate) fn pillow(detail: u32) -> Mesh {
+    const HEIGHT: f64 = 0.2;
+    let side = |towards: f64| {
+        grid(detail, detail, |uv| {
+            let p = sheet(uv);
+            let across = dvec2(1.0 - p.x.powi(4), 1.0 - p.y.powi(4));
+            let slope = -4.0 * SQUARE.recip() * HEIGHT * dvec2(p.x.powi(3) * across.y, p.y.powi(3) * across.x);
+            let position = dvec3(SQUARE * p.x, towards * HEIGHT * across.x * across.y, SQUARE * p.y);
+            (position, dvec3(-slope.x, towards, -slope.y).normalize())
+        })
+    };
+    let (mut mesh, below) = (side(1.0), side(-1.0));
+    let first = mesh.positions.len() as u32;
+    mesh.indices.extend(below.indices.as_chunks::<3>().0.iter().flat_map(|[a, b, c]| [a, c, b].map(|i| first + i)));
+    mesh.positions.extend(below.positions);
+    mesh.normals.extend(below.normals);
+    mesh.uvs.extend(below.uvs);
+    mesh
+}
+
+/// An upright tube without ends, sqrt(1/2) in radius and in half its height: `detail` columns and an eighth as many rows.
+pub(crate) fn cylinder(detail: u32) -> Mesh {
+    grid(detail, detail / 8, |uv| {
+        let normal = around(dvec2(uv.x, 0.5));
+        (dvec3(SQUARE * normal.x, SQUARE * (2.0 * uv.y - 1.0), SQUARE * normal.z), normal)
+    })
+}
+
+/// Half a side of the square in the unit circle.
+const SQUARE: f64 = FRAC_1_SQRT_2;
+
 /// Direction at `(u, v)`: `v` = 1 is up (+Y), `u` = 0.5 the front (+Z).
 fn around(uv: DVec2) -> DVec3 {
     let ((sin_phi, cos_phi), (sin, cos)) = (((uv.x - 0.5) * TAU).sin_cos(), ((1.0 - uv.y) * PI).sin_cos());
@@ -152,7 +185,7 @@ mod tests {
 
     #[test]
     fn seams_close() {
-        for mesh in [sphere(32), bumpy_sphere(16), torus_knot(32)] {
+        for mesh in [sphere(32), bumpy_sphere(16), torus_knot(32), cylinder(16)] {
             let columns = mesh.uvs.iter().position(|uv| uv[0] == 1.0).unwrap();
             for row in mesh.positions.chunks(columns + 1) {
                 let gap = glam::Vec3::from(row[0]).distance(glam::Vec3::from(row[columns]));

@@ -26,9 +26,9 @@ impl Check<'_> {
         let maps = [
             (&m.albedo_map, &texture::COLOURS[..]),
             (&m.specular_map, &texture::COLOURS),
-            (&m.normal_map, &texture::MAPS),
+            (&m.normal_map, &texture::NORMALS),
             (&m.height_map, &[]),
-            (&m.roughness_map, &texture::MAPS),
+            (&m.roughness_map, &texture::CONCENTRATIONS),
         ];
         for (map, builtins) in maps {
             self.each(map, |c, v| match v.get_ref().strip_prefix(BUILTIN) {

@@ -7,10 +7,12 @@ use crate::offline::animation::AnimatedWorld;
 use crate::offline::error::{At, Error, Result};
 use crate::offline::input;
 use crate::offline::world::World;
+use builtins::BUILTINS;
 use std::path::{Path, PathBuf};
 
 mod animation;
 mod bakes;
+mod builtins;
 mod check;
 mod format;
 mod later;
@@ -23,18 +25,6 @@ mod source;
 
 pub use animation::MAX_FRAMES;
 pub use materials::{read_merl, read_rgl, read_sgd};
-
-/// Name and text of the scenes that need no other file.
-const BUILTINS: [(&str, &str); 8] = [
-    ("trio", include_str!("../../../scenes/trio.toml")),
-    ("sphere", include_str!("../../../scenes/sphere.toml")),
-    ("bumpy-sphere", include_str!("../../../scenes/bumpy-sphere.toml")),
-    ("torus-knot", include_str!("../../../scenes/torus-knot.toml")),
-    ("crowd", include_str!("../../../scenes/crowd.toml")),
-    ("maps", include_str!("../../../scenes/maps.toml")),
-    ("waves", include_str!("../../../scenes/waves.toml")),
-    ("furnace", include_str!("../../../scenes/furnace.toml")),
-];
 
 /// A scene file that has been read and checked, but whose meshes, maps and tables are still on disk.
 #[derive(Debug)]

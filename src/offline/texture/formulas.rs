@@ -1,16 +1,27 @@
-//! Textures by formula, by name: the maps of normals and concentrations on which filters are compared.
+//! Textures by formula, by name: the maps of normals and concentrations on which filters are compared, and the surfaces of the
+//! built-in scenes.
 
 use crate::offline::error::{Error, Result};
-use crate::offline::texture::{Image, Samples};
+use crate::offline::texture::noise::{Noise, hash};
+use crate::offline::texture::{Image, Samples, surfaces};
 use glam::{DVec3, dvec3};
+use rayon::prelude::*;
 use std::f64::consts::{PI, TAU};
 use std::path::PathBuf;
 
-/// Names of the built-in maps of normals and concentrations.
+/// Names of the maps of normals and concentrations on which filters are compared.
 pub const MAPS: [&str; 7] = ["checker", "cloth", "bumps", "disk", "dunes", "flake", "atlas"];
 
+/// Names of the built-in maps of normals.
+pub const NORMALS: [&str; 12] =
+    ["checker", "cloth", "bumps", "disk", "dunes", "flake", "atlas", "facets", "tiles", "bricks", "flutes", "scales"];
+
+/// Names of the built-in maps of concentrations.
+pub const CONCENTRATIONS: [&str; 13] =
+    ["checker", "cloth", "bumps", "disk", "dunes", "flake", "atlas", "facets", "tiles", "bricks", "flutes", "damask", "patina"];
+
 /// Names of the built-in colour maps.
-pub const COLOURS: [&str; 1] = ["checker"];
+pub const COLOURS: [&str; 5] = ["checker", "tiles", "bricks", "damask", "damask-sheen"];
 
 /// What a texture is for: formulas have one for each.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -24,68 +35,82 @@ pub enum Part {
 }
 
 impl Image {
-    /// The built-in texture `name`: repeating, 1024x1024 or 512x512. `checker` is flat, of 16-texel cells of concentration 24
-    /// (colour 0.7) and 768 (0.05); `cloth` woven of 64x64 threads and crumpled; `bumps` hemispheres of 32 texels with dull
-    /// patches; `disk` engraved with rings and spokes; `dunes` ridges; `flake` of 2x2-texel facets; `atlas` a quarter each of
-    /// bumps, disk, dunes and checker.
+    /// The built-in texture `name`, repeating. On [`MAPS`], of 1024x1024 or 512x512 texels, filters are compared: `checker` is
+    /// flat, of 16-texel cells of concentration 24 (colour 0.7) and 768 (0.05); `cloth` woven of 64x64 threads and crumpled;
+    /// `bumps` hemispheres of 32 texels with dull patches; `disk` engraved with rings and spokes; `dunes` ridges; `flake` of
+    /// 2x2-texel facets; `atlas` a quarter each of bumps, disk, dunes and checker.
+    ///
+    /// Scenes are made of the others: `facets` (1024x1024), polished plateaus between rough grooves, drawn anew in each texel;
+    /// `tiles` (2048x2048), 16x16 glazed tiles; `bricks` (1024x1024); `flutes` of a column with polished veins (1024x1024);
+    /// `scales` of a skin (2048x2048); `damask`, silk and gold threads (2048x1024), whose reflectance is `damask-sheen`;
+    /// `patina`, worn patches (671x457).
     ///
     /// # Errors
     /// [`Error::Argument`] for another name.
     pub fn builtin(name: &str, part: Part) -> Result<Self> {
-        let (side, texel): (usize, Box<dyn Fn(usize, usize) -> DVec3>) = match (name, part) {
-            ("checker", Part::Colour) => (1024, Box::new(|x, y| DVec3::splat(if odd(x, y) { 0.7 } else { 0.05 }))),
-            (_, Part::Normal) => normals(name)?,
-            (_, Part::Concentration) => concentrations(name)?,
-            (_, Part::Colour) => return Err(Error::argument("built-in texture", COLOURS.join(", "), name)),
+        let ([width, height], texel) = match (name, part, surfaces::formula(name, part)) {
+            (_, _, Some(formula)) => formula,
+            ("checker", Part::Colour, _) => {
+                let colour: Texel = Box::new(|x, y| DVec3::splat(if odd(x, y) { 0.7 } else { 0.05 }));
+                ([1024; 2], colour)
+            }
+            (_, Part::Normal, _) => normals(name)?,
+            (_, Part::Concentration, _) => concentrations(name)?,
+            (_, Part::Colour, _) => return Err(Error::argument("built-in texture", COLOURS.join(", "), name)),
         };
-        let texels = (0..side * side).map(|i| texel(i % side, i / side).as_vec3().to_array()).collect();
+        let texel = |i: usize| texel(i % width, i / width).as_vec3().to_array();
+        let texels = (0..width * height).into_par_iter().map(texel).collect();
         let path = PathBuf::from(format!("builtin:{name}"));
-        Ok(Self { path, size: [side as u32; 2], samples: Samples::Float(texels) })
+        Ok(Self { path, size: [width as u32, height as u32], samples: Samples::Float(texels) })
     }
 }
 
-/// Side, and the texel in a column and row.
-type Formula = (usize, Box<dyn Fn(usize, usize) -> DVec3>);
+/// The texel in a column and row.
+pub(super) type Texel = Box<dyn Fn(usize, usize) -> DVec3 + Sync>;
+
+/// Width and height, and their texels.
+pub(super) type Formula = ([usize; 2], Texel);
 
 fn normals(name: &str) -> Result<Formula> {
     Ok(match name {
-        "checker" => (1024, Box::new(|_, _| DVec3::Z)),
+        "checker" => ([1024; 2], Box::new(|_, _| DVec3::Z)),
         "cloth" => {
-            from_height(1024, 0.75, |u, v| 1.2 * (TAU * 64.0 * u).sin() * (TAU * 64.0 * v).sin() + 10.0 * CREASES.at(u, v))
+            from_height([1024; 2], 0.75, |u, v| 1.2 * (TAU * 64.0 * u).sin() * (TAU * 64.0 * v).sin() + 10.0 * CREASES.at(u, v))
         }
-        "bumps" => (1024, Box::new(|x, y| bump(x, y).normalize())),
-        "disk" => from_height(512, 0.8, disk),
-        "dunes" => from_height(512, 0.45, dunes),
-        "flake" => (512, Box::new(flake)),
+        "bumps" => ([1024; 2], Box::new(|x, y| bump(x, y).normalize())),
+        "disk" => from_height([512; 2], 0.8, disk),
+        "dunes" => from_height([512; 2], 0.45, dunes),
+        "flake" => ([512; 2], Box::new(flake)),
         "atlas" => {
             let [bumps, disk, dunes] = [normals("bumps")?.1, normals("disk")?.1, normals("dunes")?.1];
-            (1024, quarters([bumps, disk, dunes, Box::new(|_, _| DVec3::Z)]))
+            ([1024; 2], quarters([bumps, disk, dunes, Box::new(|_, _| DVec3::Z)]))
         }
-        _ => return Err(Error::argument("built-in texture", MAPS.join(", "), name)),
+        _ => return Err(Error::argument("built-in texture", NORMALS.join(", "), name)),
     })
 }
 
 fn concentrations(name: &str) -> Result<Formula> {
-    let even = |side, kappa| -> Formula { (side, Box::new(move |_, _| DVec3::splat(kappa))) };
+    let even = |side, kappa| -> Formula { ([side; 2], Box::new(move |_, _| DVec3::splat(kappa))) };
     Ok(match name {
-        "checker" => (1024, Box::new(|x, y| DVec3::splat(if odd(x, y) { 24.0 } else { 768.0 }))),
+        "checker" => ([1024; 2], Box::new(|x, y| DVec3::splat(if odd(x, y) { 24.0 } else { 768.0 }))),
         "cloth" => even(1024, 128.0),
-        "bumps" => {
-            (1024, Box::new(|x, y| DVec3::splat(if PATCHES.at(centre(x, 1024), centre(y, 1024)) > 0.02 { 40.0 } else { 400.0 })))
-        }
+        "bumps" => (
+            [1024; 2],
+            Box::new(|x, y| DVec3::splat(if PATCHES.at(centre(x, 1024), centre(y, 1024)) > 0.02 { 40.0 } else { 400.0 })),
+        ),
         "disk" => even(512, 300.0),
         "dunes" => even(512, 60.0),
         "flake" => even(512, 1500.0),
         "atlas" => {
             let [bumps, checker] = [concentrations("bumps")?.1, concentrations("checker")?.1];
-            (1024, quarters([bumps, even(512, 300.0).1, even(512, 60.0).1, checker]))
+            ([1024; 2], quarters([bumps, even(512, 300.0).1, even(512, 60.0).1, checker]))
         }
-        _ => return Err(Error::argument("built-in texture", MAPS.join(", "), name)),
+        _ => return Err(Error::argument("built-in texture", CONCENTRATIONS.join(", "), name)),
     })
 }
 
 /// The first 512x512 of each: top left, top right, bottom left, bottom right.
-fn quarters(parts: [Box<dyn Fn(usize, usize) -> DVec3>; 4]) -> Box<dyn Fn(usize, usize) -> DVec3> {
+fn quarters(parts: [Texel; 4]) -> Texel {
     Box::new(move |x, y| {
         let [a, b, c, d] = &parts;
         let part = match (x < 512, y < 512) {
@@ -98,7 +123,8 @@ fn quarters(parts: [Box<dyn Fn(usize, usize) -> DVec3>; 4]) -> Box<dyn Fn(usize,
     })
 }
 
-fn centre(at: usize, side: usize) -> f64 {
+/// The centre of a texel among `side`, from 0 to 1.
+pub(super) fn centre(at: usize, side: usize) -> f64 {
     (at as f64 + 0.5) / side as f64
 }
 
@@ -106,16 +132,17 @@ fn odd(x: usize, y: usize) -> bool {
     (x / 16 + y / 16) % 2 == 1
 }
 
-/// Normals by central differences over the repeating map, y along the rows.
-fn from_height(side: usize, scale: f64, height: impl Fn(f64, f64) -> f64) -> Formula {
-    let heights: Vec<f64> = (0..side * side).map(|i| height(centre(i % side, side), centre(i / side, side))).collect();
+/// Normals by central differences over the repeating map, y along the rows; `scale` makes slopes of differences of heights.
+pub(super) fn from_height(size: [usize; 2], scale: f64, height: impl Fn(f64, f64) -> f64 + Sync) -> Formula {
+    let [w, h] = size;
+    let heights: Vec<f64> = (0..w * h).into_par_iter().map(|i| height(centre(i % w, w), centre(i / w, h))).collect();
     let normal = move |x: usize, y: usize| {
-        let at = |x: usize, y: usize| heights.get((y % side) * side + x % side).copied().unwrap_or_default();
-        let along_x = at(x + 1, y) - at(x + side - 1, y);
-        let along_y = at(x, y + 1) - at(x, y + side - 1);
+        let at = |x: usize, y: usize| heights.get((y % h) * w + x % w).copied().unwrap_or_default();
+        let along_x = at(x + 1, y) - at(x + w - 1, y);
+        let along_y = at(x, y + 1) - at(x, y + h - 1);
         dvec3(-along_x * 0.5 * scale, -along_y * 0.5 * scale, 1.0).normalize()
     };
-    (side, Box::new(normal))
+    (size, Box::new(normal))
 }
 
 /// A hemisphere, steep at most asin 0.9, and flat between.
@@ -155,51 +182,13 @@ fn flake(x: usize, y: usize) -> DVec3 {
     dvec3(x, y, 1.0).normalize()
 }
 
-/// Octaves of smooth noise on repeating grids of random values, minus one half each.
-struct Noise {
-    /// Cells of the first octave; each other has twice as many.
-    base: i64,
-    octaves: i64,
-    gain: f64,
-    seed: i64,
-}
-
 const CREASES: Noise = Noise { base: 16, octaves: 6, gain: 0.55, seed: 11 };
 const PATCHES: Noise = Noise { base: 32, octaves: 4, gain: 0.6, seed: 77 };
-
-impl Noise {
-    fn at(&self, u: f64, v: f64) -> f64 {
-        let (mut sum, mut weight, mut period) = (0.0, 1.0, self.base);
-        for octave in 0..self.octaves {
-            sum += weight * (value(u * period as f64, v * period as f64, period, self.seed + octave) - 0.5);
-            (period, weight) = (period * 2, weight * self.gain);
-        }
-        sum
-    }
-}
-
-fn value(x: f64, y: f64, period: i64, seed: i64) -> f64 {
-    let smooth = |t: f64| t * t * t * (t * (t * 6.0 - 15.0) + 10.0);
-    let (fx, fy) = (smooth(x - x.floor()), smooth(y - y.floor()));
-    let corner = |i: i64, j: i64| hash((x.floor() as i64 + i) % period, (y.floor() as i64 + j) % period, seed);
-    let row = |j| corner(0, j) + (corner(1, j) - corner(0, j)) * fx;
-    row(0) + (row(1) - row(0)) * fy
-}
-
-/// A number in [0, 1) for each cell.
-fn hash(x: i64, y: i64, seed: i64) -> f64 {
-    let all = (x as u32).wrapping_mul(374_761_393).wrapping_add((y as u32).wrapping_mul(668_265_263));
-    let mut h = all.wrapping_add((seed as u32).wrapping_mul(2_246_822_519));
-    h = (h ^ h >> 13).wrapping_mul(1_274_126_177);
-    h ^= h >> 16;
-    h = h.wrapping_mul(2_246_822_519);
-    h ^= h >> 13;
-    f64::from(h >> 8) / 16_777_216.0
-}
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use glam::Vec3;
 
     /// Texels of the reference implementation in Python (numpy) of the same formulas: x and y of the normal, concentration.
     const PINNED: [(&str, usize, usize, [f32; 2], f32); 14] = [
@@ -238,5 +227,28 @@ mod tests {
         assert!(Image::builtin("bumps", Part::Colour).is_err() && Image::builtin("fog", Part::Normal).is_err());
         let checks = Image::builtin("checker", Part::Colour).unwrap();
         assert_eq!([checks.raw(0).x, checks.raw(16).x], [0.05, 0.7]);
+    }
+
+    #[test]
+    fn every_name_has_a_map() {
+        for (part, names) in [(Part::Normal, &NORMALS[..]), (Part::Concentration, &CONCENTRATIONS), (Part::Colour, &COLOURS)] {
+            for name in names {
+                let image = Image::builtin(name, part).unwrap();
+                let [width, height] = image.size().map(|side| side as usize);
+                let (mut least, mut most) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
+                for i in 0..width * height {
+                    let texel = image.raw(i);
+                    (least, most) = (least.min(texel), most.max(texel));
+                    assert!(part != Part::Normal || texel.is_normalized() && texel.z > 0.05, "{name} {i}: {texel}");
+                }
+                let bounds = match part {
+                    Part::Colour => 0.0..=1.0,
+                    Part::Normal => -1.0..=1.0,
+                    Part::Concentration => 1.0..=2000.0,
+                };
+                assert!(bounds.contains(&least.min_element()) && bounds.contains(&most.max_element()), "{name}: {least} {most}");
+            }
+            assert!(Image::builtin("fog", part).is_err());
+        }
     }
 }

@@ -3,13 +3,15 @@
 mod decode;
 mod formulas;
 mod heights;
+mod noise;
+mod surfaces;
 
 use crate::offline::error::{At, Error, Result};
 use crate::texture::{Texture, decode_byte, decode_srgb};
 use glam::{DVec2, DVec3, Vec3};
 use std::path::{Path, PathBuf};
 
-pub use formulas::{COLOURS, MAPS, Part};
+pub use formulas::{COLOURS, CONCENTRATIONS, MAPS, NORMALS, Part};
 pub use heights::Heights;
 
 /// Extensions of the files that [`Image::read`] reads.
