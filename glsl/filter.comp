@@ -26,8 +26,14 @@ layout(constant_id = 6) const uint CELL_CLASSES = 0u;
 layout(constant_id = 7) const uint FILTER = 0u;
 // Layers of `lobes`; 0 where the filter has no lobes of its own.
 layout(constant_id = 8) const uint LOBES = 0u;
-// Most look-ups along the longer axis of a footprint.
+// Most look-ups along the longer axis of a footprint, and what is added to their level.
 layout(constant_id = 9) const uint ANISOTROPY = 1u;
+layout(constant_id = 10) const float LOD_BIAS = 0.0;
+// Whether concentrations follow from lengths by the paper's equation 8, and the lengths below which cells are divided; 0 to go by
+// their spread.
+layout(constant_id = 11) const bool LITERAL = false;
+layout(constant_id = 12) const float LENGTH_OF_ONE = 0.0;
+layout(constant_id = 13) const float LENGTH_OF_QUARTERS = 0.0;
 
 struct MapRecord {
     uvec4 places;        // albedo, specular, normal, roughness: 0 for none, else (layer << 3 | class) + 1
@@ -85,7 +91,7 @@ Reach reach_of(uint classes, uint code, vec4 footprint) {
     vec2 x = footprint.xy * size, y = footprint.zw * size;
     float xx = dot(x, x), yy = dot(y, y), major = max(max(xx, yy), 1.0), minor = max(min(xx, yy), 1.0);
     float taps = clamp(ceil(sqrt(major / minor) - 1e-3), 1.0, float(ANISOTROPY));
-    return Reach(size, xx > yy ? footprint.xy : footprint.zw, taps, 0.5 * log2(max(major / (taps * taps), 1.0)));
+    return Reach(size, xx > yy ? footprint.xy : footprint.zw, taps, max(0.5 * log2(max(major / (taps * taps), 1.0)) + LOD_BIAS, 0.0));
 }
 
 // Where look-up i is taken.
@@ -210,12 +216,17 @@ float cell_spread(Cell c) {
 
 void keep_cell(ivec2 p, inout Found f, Cell c, float share) {
     if (c.sum.w * share > LEAST_WEIGHT) {
-        keep(p, f, c.sum.xyz / c.sum.w, vmf_concentration(cell_spread(c)), c.sum.w * share);
+        float spread = cell_spread(c), kappa = LITERAL ? vmf_literal_concentration(spread) : vmf_concentration(spread);
+        keep(p, f, c.sum.xyz / c.sum.w, kappa, c.sum.w * share);
     }
 }
 
-// How much of a cell's one lobe stays beside those of its parts: by how far its spread goes beyond that of its lobes.
-float cell_kept(Cell c) {
+// How much of a cell's one lobe stays beside those of its parts: by the length of its mean vector, or by how far its spread goes
+// beyond that of its lobes.
+float cell_kept(Cell c, float length) {
+    if (length > 0.0) {
+        return 1.0 - cell_spread(c) >= length ? 1.0 : 0.0;
+    }
     float base = max(c.spread / max(c.sum.w, LEAST_WEIGHT), VMF_LEAST_SPREAD);
     float t = clamp((1.25 - cell_spread(c) / (1.5 * base)) * 2.0, 0.0, 1.0);
     return t * t * (3.0 - 2.0 * t);
@@ -272,11 +283,11 @@ void decode(ivec2 p, MapRecord record, vec2 uv, vec4 footprint, inout Found f) {
         }
         f.mean = all.sum.xyz / all.sum.w;
         if (FILTER == FILTER_VMF) {
-            float one = cell_kept(all);
+            float one = cell_kept(all, LENGTH_OF_ONE);
             keep_cell(p, f, all, one);
             for (uint i = 0u; i < 4u; ++i) {
                 Cell quarter = both(cells[2u * i], cells[2u * i + 1u]);
-                float kept = cell_kept(quarter);
+                float kept = cell_kept(quarter, LENGTH_OF_QUARTERS);
                 keep_cell(p, f, quarter, (1.0 - one) * kept);
                 keep_cell(p, f, cells[2u * i], (1.0 - one) * (1.0 - kept));
                 keep_cell(p, f, cells[2u * i + 1u], (1.0 - one) * (1.0 - kept));
@@ -303,7 +314,7 @@ void decode(ivec2 p, MapRecord record, vec2 uv, vec4 footprint, inout Found f) {
             vec4 moments = look_up(MOMENT_CLASSES, record.moments, layer + i, uv, r);
             moments.w = FILTER == FILTER_FIXED ? constant : moments.w;
             f.mean = i == 0u ? moments.xyz : f.mean;
-            keep(p, f, moments.xyz, moments_concentration(FILTER, moments), weight);
+            keep(p, f, moments.xyz, moments_concentration(FILTER, moments, LITERAL), weight);
         }
     }
     if (record.upright == 0u) {

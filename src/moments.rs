@@ -1,7 +1,7 @@
 //! What the filters that read through mips make of a material's normals and roughness, in f64: twin of the passes `brdf_map` and
 //! `vmf_mips` and of what `filter` decodes.
 
-use crate::config::{Filter, MOST_BASE_LOBES};
+use crate::config::{Division, Filter, MOST_BASE_LOBES};
 use crate::distribution::effective::{self, Rule};
 use crate::distribution::surface::FoundLobes;
 use crate::distribution::{BrdfMap, Filtered, Mixture};
@@ -19,12 +19,12 @@ pub(crate) struct BaseLobes {
 }
 
 impl BaseLobes {
-    /// `None` for tables, which have none of their own, and for more lobes than are taken apart.
-    pub fn of(model: &Model) -> Option<Self> {
+    /// By `rule`; `None` for tables, which have none of their own, and for more lobes than are taken apart.
+    pub fn of(model: &Model, rule: Rule) -> Option<Self> {
         let least = |ggx: &Ggx| Model::Ggx(Ggx { alpha: ggx.alpha.max(LEAST_ALPHA), ..*ggx });
         let lobes = match model {
-            Model::Ggx(ggx) => effective::base(&least(ggx), None, Rule::Exact)?,
-            other => effective::base(other, None, Rule::Exact)?,
+            Model::Ggx(ggx) => effective::base(&least(ggx), None, rule)?,
+            other => effective::base(other, None, rule)?,
         };
         let none = Lobe { mu: DVec3::Z, kappa: 0.0, weight: 0.0 };
         let mut all = [none; MOST_BASE_LOBES];
@@ -63,9 +63,9 @@ pub(crate) enum Parameter {
 
 impl Base {
     /// Of a material that has something to filter.
-    pub fn of(material: &Material) -> Option<Self> {
+    pub fn of(material: &Material, rule: Rule) -> Option<Self> {
         let maps = &material.maps;
-        let base = BaseLobes::of(&material.model).map_or(Self::Normals, Self::Lobes);
+        let base = BaseLobes::of(&material.model, rule).map_or(Self::Normals, Self::Lobes);
         (maps.normal.is_some() || base != Self::Normals && maps.roughness.is_some()).then_some(base)
     }
 
@@ -113,19 +113,23 @@ pub struct Moments {
 
 impl Moments {
     /// Those that `filter` reads of a valid material; `None` for filters that read no mips of normals, and for materials without
-    /// a map to filter.
-    pub fn of(material: &Material, filter: Filter) -> Option<Self> {
-        let (filter, base) = (filter.stored()?, Base::of(material)?);
+    /// a map to filter. `literal` is [`crate::Config::literal_lobes`].
+    pub fn of(material: &Material, filter: Filter, division: Division, literal: bool) -> Option<Self> {
+        let filter = filter.stored()?;
+        let literal = literal && filter.is_vmf();
+        let rule = if literal { Rule::Literal } else { Rule::Exact };
+        let base = Base::of(material, rule)?;
         let size = base.size(material);
-        let keep =
-            |material: &Material, filter| Some(Filtered::keeping(filter, BrdfMap::of(material, size, Rule::Exact).ok()?, false));
-        let lobes = if base == Base::Normals { None } else { Some(keep(material, filter)?) };
+        let keep = |material: &Material, filter, rule| {
+            Some(Filtered::keeping(filter, BrdfMap::of(material, size, rule).ok()?, literal).divided(division))
+        };
+        let lobes = if base == Base::Normals { None } else { Some(keep(material, filter, rule)?) };
         let normals = if base.upright() {
             None
         } else {
             let model = Model::Ggx(Ggx { alpha: LEAST_ALPHA, f0: DVec3::ONE, albedo: DVec3::ZERO });
             let maps = Maps { normal: material.maps.normal.clone(), ..Maps::default() };
-            Some(keep(&Material::new(model, maps), crate::distribution::Filter::Naive)?)
+            Some(keep(&Material::new(model, maps), crate::distribution::Filter::Naive, Rule::Exact)?)
         };
         Some(Self { filter, lobes, normals, size })
     }
@@ -174,7 +178,7 @@ impl Moments {
 mod tests {
     use super::*;
     use crate::distribution::vmf;
-    use crate::material::Roughness;
+    use crate::material::{Roughness, Sampling};
     use crate::reflectance::{BlinnPhong, MerlTable, Vmf};
 
     fn tilted(x: f32) -> [f32; 3] {
@@ -187,8 +191,8 @@ mod tests {
     }
 
     fn found(material: &Material, filter: Filter, footprint: [DVec2; 2]) -> FoundLobes {
-        let moments = Moments::of(material, filter).unwrap();
-        moments.at(DVec2::new(0.25, 0.5), &Reach::of(footprint, moments.size(), 1))
+        let moments = Moments::of(material, filter, Division::default(), false).unwrap();
+        moments.at(DVec2::new(0.25, 0.5), &Reach::of(footprint, moments.size(), Sampling::default()))
     }
 
     #[test]
@@ -226,8 +230,8 @@ mod tests {
             assert!((far.normal.x - mean.x).abs() < 1e-3 && far.lobes.count() == 0, "{far:?}");
             let rough = Texture::scalar([1, 1], &[0.5]).unwrap();
             let rough = Maps { roughness: Some((Arc::new(rough), Roughness::Alpha)), ..Maps::default() };
-            assert!(Moments::of(&Material::new(model, rough), Filter::Vmf1).is_none());
-            assert!(Moments::of(&material, Filter::Tk).is_none());
+            assert!(Moments::of(&Material::new(model, rough), Filter::Vmf1, Division::default(), false).is_none());
+            assert!(Moments::of(&material, Filter::Tk, Division::default(), false).is_none());
         }
     }
 

@@ -1,6 +1,7 @@
 //! What is recorded when something changes: the environment, the materials.
 
 use crate::config::{Estimator, Rate};
+use crate::distribution::effective::Rule;
 use crate::error::Result;
 use crate::gpu::memory::HostAllocator;
 use crate::gpu::pipeline::BridgeLayouts;
@@ -60,6 +61,7 @@ impl Renderer {
     ) -> Result<Retired> {
         let bridge = BridgeLayouts { gbuffer: layout(&self.passes.gbuffer, &self.config), materials: self.bridge.layout };
         let config = &self.config;
+        let rule = if config.takes_lobes_literally() { Rule::Literal } else { Rule::Exact };
         let (modules, slots, widened) = (&config.modules, config.frames_in_flight, config.widened());
         let (filter, passes, samplers) = (self.config.filter, self.passes.moments.as_ref(), &self.samplers);
         let eps = (self.config.rate == Rate::Bandwidth).then_some(self.config.eps);
@@ -67,7 +69,7 @@ impl Renderer {
             base::check_materials(materials)?;
         }
         let (mut upload, filter) = Build::run(&self.cx, memory, |build| {
-            let upload = MaterialsUpload::new(build, materials, &Reading { filter, widened, passes, samplers }, eps)?;
+            let upload = MaterialsUpload::new(build, materials, &Reading { filter, rule, widened, passes, samplers }, eps)?;
             let mut p = PassContext { build, modules, bridge, slots };
             let filter = filter::Filter::new(&mut p, config, upload.uses())?;
             Ok((upload, filter))

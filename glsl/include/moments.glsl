@@ -71,9 +71,10 @@ vec3 moments_direction(vec3 r) {
 }
 
 // The concentration of the lobe that a filter with lobes of directions finds in moments.
-float moments_concentration(uint filtering, vec4 moments) {
+float moments_concentration(uint filtering, vec4 moments, bool literal) {
     if (filtering == FILTER_VMF1) {
-        return vmf_concentration(moments_spread(moments.xyz, moments.w));
+        float spread = moments_spread(moments.xyz, moments.w);
+        return literal ? vmf_literal_concentration(spread) : vmf_concentration(spread);
     }
     float kappa = moments.w;
     if (filtering == FILTER_TOKSVIG || filtering == FILTER_TOKSVIG_LOBE) {

@@ -1,5 +1,6 @@
 //! Filters of normal and BRDF maps: what each stores a texel, of which mips are averages, and the lobes that it decodes.
 
+use crate::config::Division;
 use crate::distribution::brdf_map::BrdfMap;
 use crate::distribution::literal;
 use crate::distribution::mip::Mips;
@@ -40,8 +41,8 @@ pub enum Filter {
     Vmf,
 }
 
-/// The lengths of the mean vector of one and of four cells below which Algorithm 1 takes more (epsilon 0 and 1).
-const PRINTED_LENGTHS: [f64; 2] = [0.95, 0.85];
+/// How often cells are divided.
+const DIVISIONS: usize = 2;
 
 /// How much greater than its lobes' own spread a cell's spread may be before it is divided.
 const SPREAD_RATIO: f64 = 1.5;
@@ -84,6 +85,11 @@ impl Filter {
             Self::Vmf8 => "vmf8",
             Self::Vmf => "vmf",
         }
+    }
+
+    /// Whether it is of Xu et al. 2017.
+    pub fn is_vmf(self) -> bool {
+        matches!(self.storage(), Storage::Cells(_))
     }
 
     /// How its lobes are masked.
@@ -160,6 +166,7 @@ pub struct Filtered<'a> {
     filter: Filter,
     map: Cow<'a, BrdfMap>,
     literal: bool,
+    division: Division,
     /// The mean concentration of the map.
     constant: f64,
     mips: Mips,
@@ -183,7 +190,13 @@ impl<'a> Filtered<'a> {
             map.lobes().iter().map(|l| l.weight * l.kappa).sum::<f64>() * map.lobes_per_texel() as f64 / map.lobes().len() as f64;
         let (slots, stride) = filter.storage().layout(map.lobes_per_texel());
         let mips = Mips::new(map.size(), slots * stride, |i, out| encode(filter.storage(), map.texel(i), literal, out));
-        Self { filter, map, literal, constant, mips }
+        let division = if literal { Division::PRINTED } else { Division::default() };
+        Self { filter, map, literal, division, constant, mips }
+    }
+
+    /// The same with another rule for the cells of [`Filter::Vmf`].
+    pub fn divided(self, division: Division) -> Self {
+        Self { division, ..self }
     }
 
     /// How many levels there are.
@@ -268,7 +281,7 @@ impl<'a> Filtered<'a> {
     /// The lobes of cells, all of them or the two halves of one of four: as one cell's lobe, divided, or between the two.
     fn divide(&self, cells: &[Cell], depth: usize, share: f64, lobes: &mut Vec<Lobe>) {
         let whole = cells.iter().fold(Cell([0.0; CELL]), |sum, cell| sum.plus(cell));
-        let kept = if depth == PRINTED_LENGTHS.len() { 1.0 } else { self.kept(&whole, depth) };
+        let kept = if depth == DIVISIONS { 1.0 } else { self.kept(&whole, depth) };
         if kept > 0.0 {
             lobes.extend(whole.lobe(self.literal, share * kept));
         }
@@ -282,8 +295,8 @@ impl<'a> Filtered<'a> {
     /// How much of a cell's one lobe stays beside those of its parts: by how far its spread goes beyond that of its lobes, or
     /// all or none by the length of its mean vector.
     fn kept(&self, cell: &Cell, depth: usize) -> f64 {
-        if self.literal {
-            return f64::from(u8::from(1.0 - cell.spread() >= PRINTED_LENGTHS[depth]));
+        if let Division::Lengths(lengths) = self.division {
+            return f64::from(u8::from(lengths.get(depth).is_none_or(|length| 1.0 - cell.spread() >= *length)));
         }
         let ratio = cell.spread() / (SPREAD_RATIO * cell.base_spread());
         let t = ((1.25 - ratio) / 0.5).clamp(0.0, 1.0);

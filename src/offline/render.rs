@@ -204,6 +204,8 @@ pub(super) fn report(
         ("rate", json!(settings.rate())),
         ("lmax", json!(config.lmax)),
         ("filter", json!(config.filter.name())),
+        ("anisotropy", json!(config.anisotropy)),
+        ("literal_lobes", json!(config.takes_lobes_literally())),
         ("probes", json!(config.probes)),
         ("spc", json!(config.samples_per_cycle)),
         ("operator", json!(format!("{:?}", config.operator).to_lowercase())),

@@ -1,7 +1,7 @@
 //! Pass 0b, continued: the lobes of each texel of a material's maps, as the filters store them (Xu et al. 2017, section 4;
 //! [`crate::moments`] is the f64 twin). Once a set of materials.
 
-use crate::config::{Filter, MOST_BASE_LOBES};
+use crate::config::{Config, Filter, MOST_BASE_LOBES};
 use crate::distribution::{self, vmf};
 use crate::error::Result;
 use crate::gpu::access::Access;
@@ -196,8 +196,9 @@ pub(crate) struct Work {
 pub(crate) struct BrdfMap(ComputePipeline);
 
 impl BrdfMap {
-    pub fn new(p: &mut PassContext<'_, '_>, filter: Filter) -> Result<Self> {
-        Ok(Self(ComputePipeline::new(p.build, p.modules, &INTERFACE, p.bridge, 0, &[number(filter)])?))
+    pub fn new(p: &mut PassContext<'_, '_>, config: &Config) -> Result<Self> {
+        let constants = [number(config.filter), u32::from(config.takes_lobes_literally())];
+        Ok(Self(ComputePipeline::new(p.build, p.modules, &INTERFACE, p.bridge, 0, &constants)?))
     }
 
     /// What the recording needs: `groups` of which the images are `classes`, from `first` on, as [`Group::images`] has them.

@@ -1,6 +1,7 @@
 //! Materials' textures on the device: layers of arrays by size and format, and where each material's maps are.
 
 use crate::config::{Filter, MOST_BASE_LOBES};
+use crate::distribution::effective::Rule;
 use crate::error::Result;
 use crate::gpu::access::Access;
 use crate::gpu::buffer::Buffer;
@@ -66,6 +67,8 @@ pub(crate) type MomentArrays<'a> = [Option<(&'a Image, std::ops::Range<u32>)>; 2
 /// What textures and their moments are read with.
 pub(crate) struct Reading<'a> {
     pub filter: Filter,
+    /// How a base lobe counts.
+    pub rule: Rule,
     /// Whether the mesh's curvature widens lobes.
     pub widened: bool,
     /// There if the filter stores moments.
@@ -154,7 +157,7 @@ fn groups(
 impl MapsUpload {
     pub fn new(build: &mut Build<'_>, materials: &[Material], reading: &Reading<'_>) -> Result<Self> {
         let filters = reading.passes.is_some();
-        let base = |material| if filters { Base::of(material) } else { None };
+        let base = |material| if filters { Base::of(material, reading.rule) } else { None };
         let bases: Vec<_> = materials.iter().map(base).collect();
         let wanted = materials.iter().zip(&bases).filter_map(|(m, base)| Some(base.as_ref()?.size(m)));
         let sizes = brdf_map::sizes(wanted, reading.filter.has_cells());
@@ -191,7 +194,8 @@ impl MapsUpload {
                 *uses |= 1 << class;
             }
             // Without maps a lobe about the normal is found as it is.
-            let lone = BaseLobes::of(&material.model).filter(|own| filters && own.upright() && own.lobes().len() == 1);
+            let lone =
+                BaseLobes::of(&material.model, reading.rule).filter(|own| filters && own.upright() && own.lobes().len() == 1);
             let lobes = base.or(lone.map(Base::Lobes)).unwrap_or(Base::Normals);
             unfiltered |= lobes.lobes().is_empty();
             let [albedo, specular, normal, roughness, moments, cells] = slots.map(code);

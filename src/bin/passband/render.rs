@@ -12,7 +12,7 @@ use passband::offline::render::{Settings, render};
 use passband::offline::scene::{MAX_FRAMES, Scene};
 use passband::offline::sequence::render_frames;
 use passband::sampling::luminance;
-use passband::{Config, Estimator, Filter};
+use passband::{Config, Division, Estimator, Filter};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -60,7 +60,7 @@ pub struct Args {
     /// Frames A to B - 1 of an animation, to OUT.0000.exr and so on (a plain render is frame 0)
     #[arg(long, value_name = "A..B", value_parser = frames)]
     frames: Option<Range<u32>>,
-    /// A paper's own form of a step in the place of its correction, at --rate bandwidth
+    /// A paper's own form of a step in the place of its correction
     #[arg(long, value_name = "NAME")]
     literal: Vec<Literal>,
     /// Override a key of the scene: camera.fov_y=40
@@ -94,7 +94,7 @@ enum Rate {
     Oracle,
 }
 
-/// Equations of Bagher et al. 2011.
+/// Equations of Bagher et al. 2011, and all of Xu et al. 2017.
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Literal {
     /// Bandwidth as a mean that is weighted by what is reflected, but divided by the light alone
@@ -103,6 +103,9 @@ enum Literal {
     Eq8,
     /// One sample a cycle, half of what a cycle needs
     Eq9,
+    /// Xu et al. 2017 for --filter vmf1, vmf4, vmf8 and vmf: concentrations by equations 8 and 9, normals and lobes joined by 13 and
+    /// 14, cells divided by the length of their mean vectors
+    Xu,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -217,6 +220,12 @@ impl Args {
             combine: if literal(Literal::Eq4) { Combine::Literal } else { base.combine },
             allocation: if literal(Literal::Eq8) { Allocation::Equation8 } else { base.allocation },
             filter,
+            literal_lobes: literal(Literal::Xu),
+            division: if literal(Literal::Xu) && base.division == Division::default() {
+                Division::PRINTED
+            } else {
+                base.division
+            },
             directions: self.samples.unwrap_or(base.directions),
             estimator,
             samples_per_side: self.aa,

@@ -1,12 +1,13 @@
 //! Scene files: TOML in, a resolved [`World`] out.
 
-use crate::Config;
+use crate::config::PRINTED_LENGTHS;
 use crate::frequency::allocation::Allocation;
 use crate::frequency::operators::{Combine, Operator};
 use crate::offline::animation::AnimatedWorld;
 use crate::offline::error::{At, Error, Result};
 use crate::offline::input;
 use crate::offline::world::World;
+use crate::{Config, Division};
 use builtins::BUILTINS;
 use std::path::{Path, PathBuf};
 
@@ -109,6 +110,12 @@ impl Scene {
                 _ => base.combine,
             },
             eps: settings.eps.as_ref().map_or(base.eps, |v| *v.get_ref()),
+            anisotropy: settings.anisotropy.as_ref().map_or(base.anisotropy, |v| *v.get_ref() as u32),
+            lod_bias: settings.lod_bias.as_ref().map_or(base.lod_bias, |v| *v.get_ref() as f32),
+            division: match [&settings.eps0, &settings.eps1].map(|eps| eps.as_ref().map(|v| *v.get_ref())) {
+                [None, None] => base.division,
+                [one, quarters] => Division::Lengths([one.unwrap_or(PRINTED_LENGTHS[0]), quarters.unwrap_or(PRINTED_LENGTHS[1])]),
+            },
             geometric: settings.geometric.as_ref().map_or(base.geometric, |v| *v.get_ref()),
             directions: settings.budget.as_ref().map_or(base.directions, |v| *v.get_ref()),
             allocation: {
