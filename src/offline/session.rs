@@ -14,6 +14,7 @@ use crate::offline::headless::Headless;
 use crate::offline::lobe_cache;
 use crate::offline::mesh_buffers::MeshBuffers;
 use crate::offline::read_back::copy_buffer;
+use crate::offline::window::{Window, near};
 use crate::offline::world::{Camera, World};
 use crate::pass::PassContext;
 use crate::pass::probe::Probe;
@@ -22,18 +23,17 @@ use crate::renderer::Renderer;
 use crate::sampling::LatLong;
 use crate::{Config, Draw, EnvironmentUse, FrameInputs, GBufferInput, Light, View};
 use ash::vk;
-use glam::{DMat4, DVec4, Mat4};
 use std::collections::HashMap;
 use std::sync::Arc;
 use std::time::Instant;
 
 /// The set-up time of uploading meshes.
 const MESHES: &str = "meshes";
-/// Near plane of the rasteriser as a fraction of the scene's reach; there is no far plane.
-const NEAR: f64 = 1e-3;
 
 /// What every frame of the session shows.
 struct Shown {
+    camera: Camera,
+    near: f64,
     view: View,
     draws: Vec<Draw>,
     environment: EnvironmentUse,
@@ -51,8 +51,11 @@ impl Shown {
             rotation: e.rotation as f32,
             visible: e.visible,
         });
+        let (camera, near) = (world.camera, near(world));
         Self {
-            view: view(&world.camera, extent, near(world)),
+            camera,
+            near,
+            view: Window::whole(extent).view(&camera, near),
             draws: Vec::new(),
             environment,
             lights: world.lights.clone(),
@@ -61,7 +64,7 @@ impl Shown {
     }
 
     fn inputs(&self, seed: [u32; 2]) -> FrameInputs<'_> {
-        let Self { view, draws, environment, lights, levels } = self;
+        let Self { view, draws, environment, lights, levels, .. } = self;
         let frame = FrameInputs::new(0, *view, GBufferInput::Draws(draws));
         let levels = levels.as_ref().map(|image| ImageRef {
             image: image.handle,
@@ -148,7 +151,8 @@ impl Session {
     pub fn show(&mut self, world: &World) -> Result<()> {
         let clock = Instant::now();
         let extent = self.renderer.as_ref().ok_or_else(closed)?.config().extent;
-        self.shown.view = view(&world.camera, extent, near(world));
+        (self.shown.camera, self.shown.near) = (world.camera, near(world));
+        self.look_through(&Window::whole(extent));
         self.shown.draws.clear();
         let mut former = std::mem::take(&mut self.meshes);
         let uploaded = self.upload_objects(world, &mut former);
@@ -161,6 +165,11 @@ impl Session {
             *time += milliseconds(clock);
         }
         uploaded
+    }
+
+    /// Shows a part of the camera's image from the next frame on, until [`Self::show`].
+    pub(super) fn look_through(&mut self, window: &Window) {
+        self.shown.view = window.view(&self.shown.camera, self.shown.near);
     }
 
     /// Draws for all objects; what they need is taken out of `former` or uploaded.
@@ -348,35 +357,4 @@ pub(super) fn closed() -> Error {
 
 fn milliseconds(since: Instant) -> f64 {
     since.elapsed().as_secs_f64() * 1e3
-}
-
-/// A near plane that nothing visible crosses unless the camera stands inside an object.
-fn near(world: &World) -> f64 {
-    let reach = world.objects.iter().map(|o| {
-        let centre = o.transform().w_axis.truncate();
-        centre.distance(world.camera.position)
-    });
-    (reach.fold(0.0, f64::max) * NEAR).max(1e-6)
-}
-
-/// The camera as matrices: reversed depth is not needed, as depth travels in the surface image at full precision.
-fn view(camera: &Camera, extent: [u32; 2], near: f64) -> View {
-    let basis = camera.world_from_view();
-    let world_from_view = DMat4::from_cols(
-        basis.x_axis.extend(0.0),
-        basis.y_axis.extend(0.0),
-        basis.z_axis.extend(0.0),
-        camera.position.extend(1.0),
-    );
-    let f = 1.0 / (camera.fov_y.to_radians() / 2.0).tan();
-    let aspect = f64::from(extent[0]) / f64::from(extent[1]);
-    // Infinite far plane; Vulkan's y points down.
-    let clip_from_view = DMat4::from_cols(
-        DVec4::new(f / aspect, 0.0, 0.0, 0.0),
-        DVec4::new(0.0, -f, 0.0, 0.0),
-        DVec4::new(0.0, 0.0, -1.0, -1.0),
-        DVec4::new(0.0, 0.0, -near, 0.0),
-    );
-    let columns = |m: DMat4| -> [f32; 16] { Mat4::to_cols_array(&m.as_mat4()) };
-    View { world_from_view: columns(world_from_view), clip_from_view: columns(clip_from_view) }
 }
