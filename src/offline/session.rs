@@ -120,9 +120,7 @@ impl Session {
         // SAFETY: the command buffer is recording and submitted at once.
         headless.submit(|cmd, memory| Ok(unsafe { renderer.record_materials(cmd, &materials, memory) }?))?;
         // Beside the work on the processor, with which the rest of it is told.
-        let of_maps = |name: &&str| [crate::pass::brdf_map::NAME, crate::pass::vmf_mips::NAME].contains(name);
-        let on_device: SetupTimes =
-            renderer.set_up_timings()?.unwrap_or_default().passes.into_iter().filter(|(name, _)| of_maps(name)).collect();
+        let on_device = of_maps(&renderer)?;
         let others: f64 = on_device.iter().map(|(_, time)| time).sum();
         setup.push((crate::pass::materials::NAME, milliseconds(clock) - others));
         setup.extend(on_device);
@@ -170,6 +168,18 @@ impl Session {
     /// Shows a part of the camera's image from the next frame on, until [`Self::show`].
     pub(super) fn look_through(&mut self, window: &Window) {
         self.shown.view = window.view(&self.shown.camera, self.shown.near);
+    }
+
+    /// Makes the materials anew, as when they had changed: the GPU milliseconds of each pass that makes their maps.
+    ///
+    /// # Errors
+    /// The library's or the device's.
+    pub fn renew_materials(&mut self, world: &World) -> Result<SetupTimes> {
+        let renderer = self.renderer.as_mut().ok_or_else(closed)?;
+        let materials: Vec<_> = world.materials.iter().map(|m| m.surface()).collect();
+        // SAFETY: every submission is waited for; the command buffer is recording and submitted at once.
+        self.headless.submit(|cmd, memory| Ok(unsafe { renderer.record_materials(cmd, &materials, memory) }?))?;
+        of_maps(renderer)
     }
 
     /// Draws for all objects; what they need is taken out of `former` or uploaded.
@@ -349,6 +359,12 @@ impl Drop for Session {
             unsafe { bag.free(host.device, memory) };
         }
     }
+}
+
+/// Times of the passes that made the materials' maps.
+fn of_maps(renderer: &Renderer) -> Result<SetupTimes> {
+    let known = |name: &&str| [crate::pass::brdf_map::NAME, crate::pass::vmf_mips::NAME].contains(name);
+    Ok(renderer.set_up_timings()?.unwrap_or_default().passes.into_iter().filter(|(name, _)| known(name)).collect())
 }
 
 pub(super) fn closed() -> Error {
