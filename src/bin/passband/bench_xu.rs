@@ -5,7 +5,8 @@ use passband::offline::bench::statistics::{Ratio, Summary};
 use passband::offline::bench::xu::report::{Cost, Errors, Report, Row, SceneReport};
 
 const ERRORS: &str = "Errors against the truth, over pixels that surfaces cover wholly
-noise: the image's own, as a rel. L2; preconv.: rel. L2 where the environment is looked up as it is convolved beforehand, noise-free";
+noise: the image's own, as a rel. L2; less noise: without what it and the truth's add to the error in the mean;
+preconv.: rel. L2 where the environment is looked up as it is convolved beforehand, without noise of its own";
 
 const COSTS: &str = "Costs on the device (Xu et al. 2017, table 1)
 set-up: brdf_map and vmf_mips, on change; shading: filter and base (or shade), in every frame; 64x: one frame of filter point with 8
@@ -40,6 +41,7 @@ fn errors(scene: &SceneReport) -> String {
         vec![
             row.filter.into(),
             of(row, &|e| format!("{:.4}", e.rel_l2)),
+            of(row, &|e| format!("{:.4}", e.less_noise)),
             of(row, &|e| format!("{:.4}", e.color_error)),
             of(row, &|e| format!("{:.2}", e.psnr)),
             of(row, &|e| format!("{:.4}", e.flip)),
@@ -50,7 +52,19 @@ fn errors(scene: &SceneReport) -> String {
             row.lobes.map_or(String::new(), |lobes| format!("{lobes:.2}")),
         ]
     };
-    let header = ["filter", "rel. L2", "color", "PSNR", "FLIP", "noise", "preconv.", "zoom flicker", "orbit flicker", "lobes/px"];
+    let header = [
+        "filter",
+        "rel. L2",
+        "less noise",
+        "color",
+        "PSNR",
+        "FLIP",
+        "noise",
+        "preconv.",
+        "zoom flicker",
+        "orbit flicker",
+        "lobes/px",
+    ];
     let mut text = format!("{}\n{}", title(scene), aligned(&header, 1, scene.rows.iter().map(row)));
     let truth = &scene.truth;
     text += &format!(

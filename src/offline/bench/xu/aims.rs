@@ -31,9 +31,9 @@ pub(super) fn targets(scenes: &[SceneReport]) -> Vec<Target> {
         Target::new(what, &sorted, worst, aim, at_least)
     };
     let errors = |light: Light, names: &'static [&'static str], aim: f64| {
-        let what = format!("rel_l2 of {FINEST} over {RIVAL}'s on {}, {}", names.join(", "), light.name());
+        let what = format!("rel_l2, less noise, of {FINEST} over {RIVAL}'s on {}, {}", names.join(", "), light.name());
         worst(what, aim, false, &move |scene| {
-            let error = |filter| Some(scene.row(filter)?.errors.as_ref()?.rel_l2);
+            let error = |filter| Some(scene.row(filter)?.errors.as_ref()?.less_noise);
             let judged = scene.light == light && names.contains(&scene.scene.as_str());
             ratio(error(FINEST).filter(|_| judged)?, error(RIVAL)?)
         })
@@ -59,4 +59,83 @@ pub(super) fn targets(scenes: &[SceneReport]) -> Vec<Target> {
 
 fn ratio(a: f64, b: f64) -> Option<f64> {
     Some(a / b).filter(|r| r.is_finite())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Filter;
+    use crate::offline::bench::quality::Noise;
+    use crate::offline::bench::statistics::{Ratio, Summary};
+    use crate::offline::bench::table::Verdict;
+    use crate::offline::bench::xu::report::{Cost, Errors, TruthReport};
+
+    fn row(filter: &'static str, rel_l2: f64, set_up: f64, gain: f64) -> Row {
+        let times = |median| Summary { median, ..Summary::default() };
+        let ratio = |ratio| Some(Ratio { ratio, interval: [ratio; 2] });
+        Row {
+            filter,
+            errors: Some(Errors {
+                rmse: 0.0,
+                rel_l2,
+                color_error: 0.0,
+                psnr: 20.0,
+                flip: 0.1,
+                directions: 0,
+                noise: 0.0,
+                less_noise: rel_l2,
+            }),
+            cost: Some(Cost {
+                set_up_ms: Some(times(set_up)),
+                shade_ms: times(1.0),
+                frame_ms: times(2.0),
+                gain: ratio(gain),
+                gain_with_set_up: ratio(gain / 2.0),
+                over_lean: ratio(1.5),
+                ns_a_texel: None,
+                bytes_a_texel: None,
+            }),
+            ..Row::new(Filter::Point)
+        }
+    }
+
+    fn scene(name: &str, light: Light, rows: Vec<Row>) -> SceneReport {
+        let noise = Noise { rmse: 0.0, rel_l2: 0.0, relmse: 0.0, psnr: 60.0 };
+        let supersampling = row("point", 0.0, 0.0, 1.0).cost.unwrap();
+        SceneReport {
+            scene: name.into(),
+            light,
+            extent: [8, 8],
+            truth: TruthReport { samples: 4096, cached: 0, noise, pixels: 64, margin: 10.0 },
+            flicker_noise: None,
+            texels: 1,
+            estimator: "preconvolved",
+            supersampling,
+            order: Vec::new(),
+            rows,
+        }
+    }
+
+    #[test]
+    fn each_aim_is_judged_where_it_is_worst() {
+        let rows =
+            |error, gain| vec![row("vmf8", error, 1.0, 1.0), row("toksvig-lobe", 0.5, 1.0, 1.0), row("vmf", 0.1, 3.0, gain)];
+        let scenes = [
+            scene("cloth-plane", Light::Point, rows(0.3, 20.0)),
+            scene("disk-plane", Light::Point, rows(0.45, 10.0)),
+            // Of no aim's errors, but of all costs.
+            scene("hall", Light::Point, rows(5.0, 7.0)),
+            scene("dunes-plane", Light::Environment, [rows(0.4, 30.0), vec![row("vmf1", 0.2, 2.5, 1.0)]].concat()),
+        ];
+        let found = targets(&scenes);
+        let of = |what: &str| found.iter().find(|t| t.what.contains(what)).map(|t| (t.found.factor, t.worst.as_str(), t.verdict));
+        assert_eq!(of("disk-plane, point"), Some((0.9, "disk-plane point", Verdict::Missed)));
+        assert_eq!(of("dunes-plane, environment"), Some((0.8, "dunes-plane environment", Verdict::Passed)));
+        assert_eq!(of("dunes-plane, point"), None, "it was not measured");
+        assert_eq!(of("over vmf's, least"), Some((7.0, "hall point", Verdict::Missed)));
+        assert_eq!(of("over vmf's with set-up"), Some((3.5, "hall point", Verdict::Passed)));
+        assert_eq!(of("three subdivision levels"), Some((1.2, "dunes-plane environment", Verdict::Passed)));
+        assert_eq!(of("over LEAN's").map(|t| t.2), Some(Verdict::Passed));
+        assert_eq!(found.len(), 6);
+    }
 }

@@ -14,8 +14,8 @@ use std::time::Instant;
 
 /// Of each motion.
 pub const FRAMES: u32 = 16;
-/// Pixels of a frame.
-const EXTENT: [u32; 2] = [128; 2];
+/// The most pixels a side of a frame; no more than stills have.
+const MOST_SIDE: u32 = 128;
 /// Joint sub-samples of each truth: fewer than of a still, as there are many. What their noise makes of flicker is reported.
 const SAMPLES: u32 = 512;
 /// Directions of a frame under an environment.
@@ -57,6 +57,7 @@ pub(super) fn flicker(
     let mut found: Vec<[f64; 2]> = vec![[0.0; 2]; rows.len()];
     let mut noise = [0.0; 2];
     let total = u64::from(FRAMES);
+    let extent = stage.config.extent.map(|e| e.min(MOST_SIDE));
     for (which, motion) in [Motion::Zoom, Motion::Orbit].into_iter().enumerate() {
         let cameras: Vec<Camera> = (0..FRAMES).map(|frame| motion.camera(&stage.world.camera, frame)).collect();
         let clock = Instant::now();
@@ -64,7 +65,7 @@ pub(super) fn flicker(
         let goal = Goal { noise: 0.0, most: SAMPLES.into() };
         let (mut pictures, mut masks, mut halves): (Vec<Picture>, Vec<_>, [Vec<Picture>; 2]) = Default::default();
         for (done, camera) in (0..).zip(&cameras) {
-            let truth = truths.of(camera, EXTENT, &goal, &mut |_, _| ())?;
+            let truth = truths.of(camera, extent, &goal, &mut |_, _| ())?;
             pictures.push(truth.image().picture);
             masks.push(stills::mask(&truth));
             halves.iter_mut().zip(truth.halves()).for_each(|(all, half)| all.push(half));
@@ -79,7 +80,7 @@ pub(super) fn flicker(
         noise[which] = of(&halves[0], &halves[1])? / 2.0;
         for (done, ((filter, row), found)) in (1..).zip(Filter::ALL.into_iter().zip(rows.iter()).zip(&mut found)) {
             let session = match row.refused {
-                None => open(&stage.world, &stage.config(filter, EXTENT, DIRECTIONS), stage.device())?.ok(),
+                None => open(&stage.world, &stage.config(filter, extent, DIRECTIONS), stage.device())?.ok(),
                 Some(_) => None,
             };
             if let Some(mut session) = session {

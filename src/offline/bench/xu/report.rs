@@ -54,7 +54,7 @@ pub struct SceneReport {
     pub estimator: &'static str,
     /// One point-filtered frame of eight times as many pixels a side, which is 64 samples a pixel of the same shading.
     pub supersampling: Cost,
-    /// Filters from the smallest error to the largest, by [`Errors::rel_l2`].
+    /// Filters from the smallest error to the largest, by [`Errors::less_noise`].
     pub order: Vec<&'static str>,
     /// Every filter.
     pub rows: Vec<Row>,
@@ -111,6 +111,8 @@ pub struct Errors {
     pub directions: u32,
     /// The still's own noise, as [`Metrics::rel_l2`].
     pub noise: f64,
+    /// `rel_l2` without what the noise of still and truth adds to it in the mean: these are independent, so squares add up.
+    pub less_noise: f64,
 }
 
 /// As [`Metrics::flicker`], over [`FRAMES`](super::motion::FRAMES) frames against as many truths.
@@ -152,9 +154,11 @@ impl Row {
 }
 
 impl Errors {
-    pub(super) fn new(metrics: &Metrics, directions: u32, noise: f64) -> Self {
+    /// `truth` is the truth's noise over the same pixels.
+    pub(super) fn new(metrics: &Metrics, directions: u32, noise: f64, truth: f64) -> Self {
         let Metrics { rmse, rel_l2, color_error, psnr, flip, .. } = *metrics;
-        Self { rmse, rel_l2, color_error, psnr, flip, directions, noise }
+        let less_noise = (rel_l2 * rel_l2 - noise * noise - truth * truth).max(0.0).sqrt();
+        Self { rmse, rel_l2, color_error, psnr, flip, directions, noise, less_noise }
     }
 }
 
@@ -167,7 +171,7 @@ impl SceneReport {
 
 /// Names of filters, the best first.
 pub(super) fn order(rows: &[Row]) -> Vec<&'static str> {
-    let mut known: Vec<_> = rows.iter().filter_map(|row| Some((row.errors.as_ref()?.rel_l2, row.filter))).collect();
+    let mut known: Vec<_> = rows.iter().filter_map(|row| Some((row.errors.as_ref()?.less_noise, row.filter))).collect();
     known.sort_by(|a, b| a.0.total_cmp(&b.0));
     known.into_iter().map(|(_, filter)| filter).collect()
 }

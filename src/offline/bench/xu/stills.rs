@@ -125,12 +125,14 @@ fn lobes(session: &mut Session, config: &Config) -> Result<Option<f64>> {
 /// Errors of `stills` into their rows.
 pub(super) fn judge(stills: &mut [Still], truth: &Converged, rows: &mut [Row]) -> Result<()> {
     let (picture, mask) = (truth.image().picture, mask(truth));
+    let [a, b] = &truth.halves();
+    let noise = quality::noise([a, b], &mask)?.rel_l2;
     let error = |of: &Picture| quality::error(&[Frame { picture: of.clone(), coverage: Vec::new() }], &picture, &mask);
     for still in stills {
         let Some(row) = rows.iter_mut().find(|row| row.filter == still.filter.name()) else { continue };
-        row.errors = Some(Errors::new(&error(&still.picture)?, still.directions, still.noise));
+        row.errors = Some(Errors::new(&error(&still.picture)?, still.directions, still.noise, noise));
         let looked_up = still.preconvolved.as_ref().map(error).transpose()?;
-        row.preconvolved = looked_up.map(|metrics| Errors::new(&metrics, 0, 0.0));
+        row.preconvolved = looked_up.map(|metrics| Errors::new(&metrics, 0, 0.0, noise));
     }
     Ok(())
 }

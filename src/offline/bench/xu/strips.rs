@@ -14,6 +14,8 @@ use glam::DVec3;
 
 /// Filters beside a truth.
 const BESIDE: usize = 6;
+/// What differences are multiplied with: those of filters are large.
+const GAIN: f64 = 2.0;
 /// Images a side of the truth's detail.
 const PARTS: usize = 4;
 
@@ -24,7 +26,7 @@ pub(super) fn strip(stage: &Stage<'_>, truth: &Converged, stills: &[Still], rows
     let error = |still: &Still| rows.iter().find(|row| row.filter == still.filter.name()).and_then(|row| row.errors.as_ref());
     let whole = photograph(format!("truth, {} sub-samples a pixel", truth.directions()), &picture, exposure);
     let mut detail = whole.detail(whole.busiest(PARTS), PARTS);
-    detail.label = "its busiest part; beside it differences, 4 times".into();
+    detail.label = "its busiest part; beside it differences, 2 times".into();
     let mut tiles = Vec::new();
     for some in stills.chunks(BESIDE) {
         let empty = || Tile { label: String::new(), rgb: vec![[255; 3]; whole.rgb.len()], ..whole };
@@ -35,7 +37,7 @@ pub(super) fn strip(stage: &Stage<'_>, truth: &Converged, stills: &[Still], rows
         let mut apart = vec![detail.clone()];
         apart.extend(some.iter().map(|still| {
             let label = error(still).map_or(String::new(), |e| format!("rel. L2 {:.3}, {:.1} dB", e.rel_l2, e.psnr));
-            difference(label, &still.picture, &picture, exposure)
+            difference(label, [&still.picture, &picture], exposure, GAIN)
         }));
         fill(&mut apart);
         tiles.extend(images.into_iter().chain(apart));
