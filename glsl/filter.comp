@@ -8,7 +8,7 @@
 #include "tangent.glsl"
 #include "factors.glsl"
 #include "moments.glsl"
-#include "oct.glsl"
+#include "found.glsl"
 #include "roughness.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
@@ -47,7 +47,7 @@ struct MapRecord {
     uint count;          // of them; 0 for those that stay as they are
     uint upright;        // whether all are about the normal
     float concentration; // of the one lobe of a material without maps of normals and roughness
-    uint unused;
+    float facing;        // mean cosine of the lobes' directions to the normal
 };
 layout(set = 2, binding = 1, std430) readonly buffer Maps {
     MapRecord maps[]; // by material
@@ -62,7 +62,7 @@ layout(set = 2, binding = 8) uniform sampler2DArray textures_6;
 layout(set = 2, binding = 9) uniform sampler2DArray textures_7;
 layout(set = 2, binding = 10, rgba32f) uniform writeonly image2D normals;   // shading normal; tangent as tangent.glsl encodes it
 layout(set = 2, binding = 11, rgba32ui) uniform writeonly uimage2D factors; // as factors.glsl packs them
-layout(set = 2, binding = 12, rgba32f) uniform writeonly image2DArray lobes; // as lobes.glsl reads them
+layout(set = 2, binding = 12, rgba32ui) uniform writeonly uimage2DArray lobes; // as found.glsl packs them
 
 // What a pixel covers of a map: look-ups along the longer axis, at a level whose texels are as large as the step from one to the
 // next; with one look-up, as large as the longer axis.
@@ -175,16 +175,21 @@ struct Found {
     uint count;
     float sharpest;  // concentration of those that matter
     vec3 mean;       // of their directions, stored as x, y, 1 - z
+    uint lobes;      // LOBES_* of moments.glsl
+    float area;      // mean cosine of the lobes below, about the normals that they have there
 };
 const float MATTERS = 0.02;
 
-void keep(ivec2 p, inout Found f, vec3 mu, float kappa, float weight) {
+// Each place below has its own normal, about which its lobes fill the projected area. A wider lobe has less of a mean cosine, and
+// so much less weight: the integral over directions stays what it is there.
+void keep(ivec2 p, inout Found f, vec3 mu, float kappa, float weight, vec3 normal) {
     if (weight <= LEAST_WEIGHT || f.count >= LOBES) {
         return;
     }
     kappa /= 1.0 + 0.5 * kappa * f.kernel;
     vec3 world = f.frame * moments_direction(mu);
-    imageStore(lobes, ivec3(p, int(f.count)), vec4(oct_encode(world), kappa, weight));
+    float share = weight * moments_area(kappa, f.lobes) / f.area;
+    imageStore(lobes, ivec3(p, int(f.count)), found_pack(world, f.frame * moments_direction(normal), kappa, share));
     f.count += 1u;
     f.sharpest = weight > MATTERS ? max(f.sharpest, kappa) : f.sharpest;
 }
@@ -198,16 +203,18 @@ void keep_slopes(ivec2 p, inout Found f, vec4 first, float product, float weight
     float most = 0.9999 * sqrt(variance.x * variance.y);
     float covariance = clamp(product - first.x * first.y, -most, most);
     float widened = 0.5 * f.kernel;
-    imageStore(lobes, ivec3(p, int(f.count)), vec4(first.xy, weight, 0.0));
-    imageStore(lobes, ivec3(p, int(f.count) + 1), vec4(variance.x + widened, covariance, variance.y + widened, 0.0));
+    imageStore(lobes, ivec3(p, int(f.count)), floatBitsToUint(vec4(first.xy, weight, 0.0)));
+    vec4 matrix = vec4(variance.x + widened, covariance, variance.y + widened, 0.0);
+    imageStore(lobes, ivec3(p, int(f.count) + 1), floatBitsToUint(matrix));
     f.count += 2u;
     f.sharpest = max(f.sharpest, 1.0 / min(variance.x, variance.y));
 }
 
-// Weight times characteristic vector, weight; weight times the spread of what is in it.
+// Weight times characteristic vector, weight; weight times the spread of what is in it; weight times the normals below.
 struct Cell {
     vec4 sum;
     float spread;
+    vec3 normal;
 };
 
 float cell_spread(Cell c) {
@@ -217,7 +224,7 @@ float cell_spread(Cell c) {
 void keep_cell(ivec2 p, inout Found f, Cell c, float share) {
     if (c.sum.w * share > LEAST_WEIGHT) {
         float spread = cell_spread(c), kappa = LITERAL ? vmf_literal_concentration(spread) : vmf_concentration(spread);
-        keep(p, f, c.sum.xyz / c.sum.w, kappa, c.sum.w * share);
+        keep(p, f, c.sum.xyz / c.sum.w, kappa, c.sum.w * share, c.normal / c.sum.w);
     }
 }
 
@@ -233,38 +240,45 @@ float cell_kept(Cell c, float length) {
 }
 
 Cell both(Cell a, Cell b) {
-    return Cell(a.sum + b.sum, a.spread + b.spread);
+    return Cell(a.sum + b.sum, a.spread + b.spread, a.normal + b.normal);
 }
 
 // The cells of what a pixel covers: between base texels, which have their lobes as they are, and the levels of cells.
 void gather(MapRecord record, vec2 uv, Reach r, uint lobe_layer, out Cell cells[CELLS]) {
     for (uint i = 0u; i < CELLS; ++i) {
-        cells[i] = Cell(vec4(0.0), 0.0);
+        cells[i] = Cell(vec4(0.0), 0.0, vec3(0.0));
     }
     float coarse = min(r.level, 1.0), level = max(r.level - 1.0, 0.0);
     for (float tap = 0.0; tap < r.taps; ++tap) {
         vec2 at = reach_tap(r, uv, tap);
+        float share = coarse / r.taps;
         for (uint i = 0u; i < filter_cells(FILTER); ++i) {
-            cells[i].sum += fetch(CELL_CLASSES, record.cells, i, at, level) * (coarse / r.taps);
+            cells[i].sum += fetch(CELL_CLASSES, record.cells, i, at, level) * share;
         }
-        if (FILTER == FILTER_VMF) {
-            vec4 low = fetch(CELL_CLASSES, record.cells, CELLS, at, level) * (coarse / r.taps);
-            vec4 high = fetch(CELL_CLASSES, record.cells, CELLS + 1u, at, level) * (coarse / r.taps);
-            for (uint i = 0u; i < 4u; ++i) {
-                cells[i].spread += low[i];
-                cells[i + 4u].spread += high[i];
+        for (uint i = 0u; i < filter_cells(FILTER); i += 4u) {
+            vec4 four = fetch(CELL_CLASSES, record.cells, filter_cells(FILTER) + i / 4u, at, level) * share;
+            for (uint k = 0u; k < 4u; ++k) {
+                cells[i + k].spread += four[k];
             }
+        }
+        for (uint i = 0u; i < (record.upright != 0u ? 0u : filter_cells(FILTER)); ++i) {
+            cells[i].normal += fetch(CELL_CLASSES, record.cells, filter_normals(FILTER) + i, at, level).xyz * share;
         }
         vec2 place = vec2(at.x, 1.0 - at.y) * r.size - 0.5, first = floor(place), part = place - first;
         for (uint k = 0u; k < 4u; ++k) {
             vec2 corner = vec2(k & 1u, k >> 1), share = mix(1.0 - part, part, corner);
             vec2 centre = (first + corner + 0.5) / r.size;
+            vec3 normal = vec3(0.0);
+            if (record.upright == 0u) {
+                normal = fetch(MOMENT_CLASSES, record.moments, 0u, vec2(centre.x, 1.0 - centre.y), 0.0).xyz;
+            }
             for (uint j = 0u; j < record.count; ++j) {
                 vec4 lobe = fetch(MOMENT_CLASSES, record.moments, lobe_layer + j, vec2(centre.x, 1.0 - centre.y), 0.0);
                 float weight = record.weights[j] * share.x * share.y * ((1.0 - coarse) / r.taps);
                 uint cell = moments_cell(filter_cells(FILTER), vec3(lobe.xy, 1.0 - lobe.z));
                 cells[cell].sum += vec4(lobe.xyz, 1.0) * weight;
                 cells[cell].spread += lobe.w * weight;
+                cells[cell].normal += normal * weight;
             }
         }
     }
@@ -277,11 +291,15 @@ void decode(ivec2 p, MapRecord record, vec2 uv, vec4 footprint, inout Found f) {
     if (filter_of_cells(FILTER)) {
         Cell cells[CELLS];
         gather(record, uv, r, layer, cells);
-        Cell all = Cell(vec4(0.0), 0.0);
+        Cell all = Cell(vec4(0.0), 0.0, vec3(0.0));
         for (uint i = 0u; i < filter_cells(FILTER); ++i) {
             all = both(all, cells[i]);
+            // A lobe about the normal is one of that direction.
+            cells[i].normal = record.upright != 0u ? cells[i].sum.xyz : cells[i].normal;
         }
-        f.mean = all.sum.xyz / all.sum.w;
+        all.normal = record.upright != 0u ? all.sum.xyz : all.normal;
+        f.mean = all.normal / all.sum.w;
+        f.area = record.facing * moments_area(vmf_concentration(all.spread / max(all.sum.w, LEAST_WEIGHT)), record.lobes);
         if (FILTER == FILTER_VMF) {
             float one = cell_kept(all, LENGTH_OF_ONE);
             keep_cell(p, f, all, one);
@@ -299,6 +317,7 @@ void decode(ivec2 p, MapRecord record, vec2 uv, vec4 footprint, inout Found f) {
         }
     } else {
         uint count = filter_merges(FILTER) ? min(record.count, 1u) : record.count;
+        vec3 normal = record.upright != 0u ? vec3(0.0) : look_up(MOMENT_CLASSES, record.moments, 0u, uv, r).xyz;
         float constant = 0.0;
         for (uint i = 0u; FILTER == FILTER_FIXED && i < count; ++i) {
             // The map's mean: its last level.
@@ -313,11 +332,14 @@ void decode(ivec2 p, MapRecord record, vec2 uv, vec4 footprint, inout Found f) {
             }
             vec4 moments = look_up(MOMENT_CLASSES, record.moments, layer + i, uv, r);
             moments.w = FILTER == FILTER_FIXED ? constant : moments.w;
-            f.mean = i == 0u ? moments.xyz : f.mean;
-            keep(p, f, moments.xyz, moments_concentration(FILTER, moments, LITERAL), weight);
+            float base = FILTER == FILTER_VMF1 ? vmf_concentration(moments.w) : moments.w;
+            f.area = record.facing * moments_area(base, record.lobes);
+            normal = record.upright != 0u ? moments.xyz : normal;
+            f.mean = i == 0u ? normal : f.mean;
+            keep(p, f, moments.xyz, moments_concentration(FILTER, moments, LITERAL), weight, normal);
         }
     }
-    if (record.upright == 0u) {
+    if (record.count == 0u) {
         f.mean = look_up(MOMENT_CLASSES, record.moments, 0u, uv, r).xyz;
     }
 }
@@ -356,7 +378,7 @@ void main() {
         tangent_basis(n, x, y);
         x = t.w != 0.0 ? t.xyz : x;
         y = t.w != 0.0 ? cross(n, x) * t.w : y;
-        Found found = Found(mat3(x, y, n), f.kernel, 0u, 0.0, vec3(0.0));
+        Found found = Found(mat3(x, y, n), f.kernel, 0u, 0.0, vec3(0.0), record.lobes, 1.0);
         if (record.moments != 0u) {
             decode(p, record, uv, footprint, found);
         } else if (filter_of_slopes(FILTER)) {
@@ -364,10 +386,11 @@ void main() {
                 keep_slopes(p, found, vec4(0.0, 0.0, vec2(1.0 / max(record.concentration, LEAST_SLOPE_CONCENTRATION))), 0.0, 1.0);
             }
         } else if (record.count > 0u) {
-            keep(p, found, vec3(0.0), record.concentration, 1.0);
+            found.area = moments_area(record.concentration, record.lobes);
+            keep(p, found, vec3(0.0), record.concentration, 1.0, vec3(0.0));
         }
         if (found.count < LOBES) {
-            imageStore(lobes, ivec3(p, int(found.count)), vec4(0.0));
+            imageStore(lobes, ivec3(p, int(found.count)), uvec4(0u));
         }
         // What predicts bandwidth knows of one lobe only.
         f.alpha = found.count > 0u ? clamp(moments_alpha(found.sharpest, record.lobes), LEAST_ALPHA, record.rule.y) : f.alpha;

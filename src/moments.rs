@@ -2,6 +2,7 @@
 //! `vmf_mips` and of what `filter` decodes.
 
 use crate::config::{Division, Filter, MOST_BASE_LOBES};
+use crate::distribution::brdf_map::UPRIGHT;
 use crate::distribution::effective::{self, Rule};
 use crate::distribution::surface::FoundLobes;
 use crate::distribution::{BrdfMap, Filtered, Mixture};
@@ -37,9 +38,14 @@ impl BaseLobes {
         self.all.get(..self.count).unwrap_or_default()
     }
 
-    /// Whether all are about the normal: each is a facet then.
+    /// The mean cosine of their directions to the normal.
+    pub fn facing(&self) -> f64 {
+        self.lobes().iter().map(|lobe| lobe.weight * lobe.mu.z).sum()
+    }
+
+    /// Whether all are about the normal.
     pub fn upright(&self) -> bool {
-        self.lobes().iter().all(|lobe| lobe.mu.z > 1.0 - 1e-6)
+        self.lobes().iter().all(|lobe| lobe.mu.z > UPRIGHT)
     }
 }
 
@@ -59,6 +65,8 @@ pub(crate) enum Parameter {
     Alpha,
     /// A cosine power, whose mean cosine is exact, of alpha sqrt(2 spread).
     Exponent,
+    /// GGX of that alpha, which has a mean cosine of its own.
+    Ggx,
 }
 
 impl Base {
@@ -75,6 +83,11 @@ impl Base {
             Self::Lobes(base) => base.lobes(),
             Self::Normals => &[],
         }
+    }
+
+    /// [`BaseLobes::facing`], 1 if they stay.
+    pub fn facing(&self) -> f64 {
+        if let Self::Lobes(base) = self { base.facing() } else { 1.0 }
     }
 
     /// Whether a mean normal is stored beside lobes that are not about it.
@@ -97,7 +110,11 @@ impl Base {
 impl Parameter {
     /// Of a model's lobes.
     pub fn of(model: &Model) -> Self {
-        if matches!(model, Model::BlinnPhong(_)) { Self::Exponent } else { Self::Alpha }
+        match model {
+            Model::BlinnPhong(_) => Self::Exponent,
+            Model::Ggx(_) => Self::Ggx,
+            Model::Table(_) | Model::Turned(_) | Model::Vmf(_) => Self::Alpha,
+        }
     }
 }
 
@@ -109,6 +126,7 @@ pub struct Moments {
     /// The mean normal, where lobes are not about it.
     normals: Option<Filtered<'static>>,
     size: [u32; 2],
+    facing: f64,
 }
 
 impl Moments {
@@ -131,7 +149,7 @@ impl Moments {
             let maps = Maps { normal: material.maps.normal.clone(), ..Maps::default() };
             Some(keep(&Material::new(model, maps), crate::distribution::Filter::Naive, Rule::Exact)?)
         };
-        Some(Self { filter, lobes, normals, size })
+        Some(Self { filter, lobes, normals, size, facing: base.facing() })
     }
 
     /// What is stored of the lobes, with its mips; `None` if the material's stay as they are.
@@ -162,15 +180,25 @@ impl Moments {
         };
         let direction = |map: &Filtered<'_>, texel: &[f64]| map.mean_vector(texel).try_normalize().unwrap_or(DVec3::Z);
         let of_normals = || self.normals.as_ref().map(|map| direction(map, &mean(map)));
-        let (upright, masking) = (self.normals.is_none(), self.filter.masking());
+        let (masking, facing) = (self.filter.masking(), self.facing);
         let Some(map) = &self.lobes else {
-            return FoundLobes { normal: of_normals().unwrap_or(DVec3::Z), lobes: Mixture::Vmf(Vec::new()), upright, masking };
+            let normal = of_normals().unwrap_or(DVec3::Z);
+            let (normals, below) = (Vec::new(), Vec::new());
+            return FoundLobes { normal, lobes: Mixture::Vmf(Vec::new()), normals, below, facing, masking };
         };
         let texel = mean(map);
         let lobes = map.decode(&texel);
-        let own = || direction(map, &texel);
-        let normal = if matches!(lobes, Mixture::Slopes(_)) { DVec3::Z } else { of_normals().unwrap_or_else(own) };
-        FoundLobes { normal, lobes, upright, masking }
+        if let Mixture::Slopes(_) = &lobes {
+            return FoundLobes { normal: DVec3::Z, lobes, normals: Vec::new(), below: Vec::new(), facing, masking };
+        }
+        let by_cell = map.normals(&texel);
+        let normal = match (of_normals(), by_cell.is_empty()) {
+            (Some(normal), true) => normal,
+            _ => direction(map, &texel),
+        };
+        let normals = (0..lobes.count()).map(|i| by_cell.get(i).and_then(|n| n.try_normalize()).unwrap_or(normal)).collect();
+        let below = map.concentrations_below(&texel, lobes.count());
+        FoundLobes { normal, lobes, normals, below, facing, masking }
     }
 }
 
@@ -210,7 +238,7 @@ mod tests {
             let Mixture::Vmf(lobes) = &far.lobes else { panic!("{far:?}") };
             let length = (1.0 - spread) * (1.0f64 - 0.09).sqrt();
             assert!((vmf::mean_cosine(lobes[0].kappa) / length - 1.0).abs() < 2e-3 && far.normal.z > 0.999_999, "{far:?}");
-            assert!(far.upright && lobes.len() == 1 && (lobes[0].weight - 1.0).abs() < 1e-12);
+            assert!(far.normals == [far.normal] && lobes.len() == 1 && (lobes[0].weight - 1.0).abs() < 1e-12);
             // The two normals are in cells of their own.
             let apart = found(&material, Filter::Vmf4, [DVec2::X, DVec2::Y]);
             let Mixture::Vmf(lobes) = &apart.lobes else { panic!("{apart:?}") };
@@ -244,7 +272,8 @@ mod tests {
             [(Filter::Vmf1, 1), (Filter::Toksvig, 1), (Filter::ToksvigLobe, 2), (Filter::Vmf4, 2), (Filter::Vmf, 2)]
         {
             let far = found(&material, filter, [DVec2::X, DVec2::Y]);
-            assert!(!far.upright && far.lobes.count() == count, "{far:?}");
+            assert!(far.normals.len() == count && far.lobes.count() == count, "{far:?}");
+            assert!(far.normals.iter().all(|n| (n.x - 0.2).abs() < 1e-3) && (far.facing - 0.5f64.sqrt()).abs() < 1e-12);
             assert!((far.normal.x - 0.2).abs() < 1e-3 && (far.lobes.weight() - 1.0).abs() < 1e-9, "{far:?}");
         }
     }

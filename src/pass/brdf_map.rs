@@ -63,6 +63,7 @@ pub(crate) fn lobes(filtered: bool, parameter: Parameter) -> u32 {
         (false, _) => 0,
         (true, Parameter::Alpha) => 1,
         (true, Parameter::Exponent) => 2,
+        (true, Parameter::Ggx) => 3,
     }
 }
 
@@ -98,9 +99,10 @@ impl Layers {
             Some(F::Lean | F::Leadr) => (true, 2, 0),
             Some(F::LeanLobe) => (false, 2, 0),
             Some(F::Vmf4) => (false, 1, 4),
-            Some(F::Vmf8) => (false, 1, 8),
-            Some(F::Vmf) => (false, 1, 10),
+            Some(F::Vmf8 | F::Vmf) => (false, 1, 8),
         };
+        // With their spreads, four in a layer, and the normals below lobes that are about other directions.
+        let cells = cells + cells / 4 + if base.upright() { 0 } else { cells };
         let lobes = if merged { count.min(1) } else { count };
         Self { moments: usize::from(!base.upright()) + each * lobes, cells: if count > 0 { cells } else { 0 } }
     }

@@ -38,7 +38,7 @@ struct Record {
     count: u32,
     upright: u32,
     concentration: f32,
-    unused: u32,
+    facing: f32,
 }
 
 /// What the `filter` pass reads.
@@ -211,7 +211,7 @@ impl MapsUpload {
                 count: lobes.lobes().len() as u32,
                 upright: u32::from(lobes.upright()),
                 concentration: lobes.lobes().first().map_or(0.0, |lobe| lobe.kappa as f32),
-                unused: 0,
+                facing: lobes.facing() as f32,
             });
         }
         let classes = classes.iter().map(|class| upload(build, class)).collect::<Result<Vec<_>>>()?;

@@ -43,6 +43,7 @@ struct Push {
     count: u32,
     lobe_layer: i32,
     cell_layer: i32,
+    upright: u32,
 }
 
 pub(crate) struct Io<'a> {
@@ -95,6 +96,7 @@ impl VmfMips {
                 count: source.base.lobes().len() as u32,
                 lobe_layer: (first.moments + usize::from(!source.base.upright())) as i32,
                 cell_layer: first.cells as i32,
+                upright: u32::from(source.base.upright()),
             };
             pushes.push(with_lobes.map(push).collect());
         }
