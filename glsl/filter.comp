@@ -265,7 +265,8 @@ void gather(MapRecord record, vec2 uv, Reach r, uint lobe_layer, out Cell cells[
             cells[i].normal += fetch(CELL_CLASSES, record.cells, filter_normals(FILTER) + i, at, level).xyz * share;
         }
         vec2 place = vec2(at.x, 1.0 - at.y) * r.size - 0.5, first = floor(place), part = place - first;
-        for (uint k = 0u; k < 4u; ++k) {
+        // Base texels, where they count.
+        for (uint k = 0u; k < (coarse < 1.0 ? 4u : 0u); ++k) {
             vec2 corner = vec2(k & 1u, k >> 1), share = mix(1.0 - part, part, corner);
             vec2 centre = (first + corner + 0.5) / r.size;
             vec3 normal = vec3(0.0);
@@ -276,9 +277,13 @@ void gather(MapRecord record, vec2 uv, Reach r, uint lobe_layer, out Cell cells[
                 vec4 lobe = fetch(MOMENT_CLASSES, record.moments, lobe_layer + j, vec2(centre.x, 1.0 - centre.y), 0.0);
                 float weight = record.weights[j] * share.x * share.y * ((1.0 - coarse) / r.taps);
                 uint cell = moments_cell(filter_cells(FILTER), vec3(lobe.xy, 1.0 - lobe.z));
-                cells[cell].sum += vec4(lobe.xyz, 1.0) * weight;
-                cells[cell].spread += lobe.w * weight;
-                cells[cell].normal += normal * weight;
+                // Selected, not indexed: lanes would go to memory for a place of their own.
+                for (uint i = 0u; i < CELLS; ++i) {
+                    float mine = i == cell ? weight : 0.0;
+                    cells[i].sum += vec4(lobe.xyz, 1.0) * mine;
+                    cells[i].spread += lobe.w * mine;
+                    cells[i].normal += normal * mine;
+                }
             }
         }
     }

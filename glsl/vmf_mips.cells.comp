@@ -39,9 +39,13 @@ void main() {
                 vec4 lobe = imageLoad(lobes, ivec3(x, y, lobe_layer + int(i)));
                 float weight = share * weights[i];
                 uint cell = moments_cell(filter_cells(FILTER), vec3(lobe.xy, 1.0 - lobe.z));
-                sums[cell] += vec4(lobe.xyz, 1.0) * weight;
-                spreads[cell] += lobe.w * weight;
-                normals[cell] += vec4(normal.xyz, 1.0) * weight;
+                // Selected, not indexed: lanes would go to memory for a place of their own.
+                for (uint k = 0u; k < CELLS; ++k) {
+                    float mine = k == cell ? weight : 0.0;
+                    sums[k] += vec4(lobe.xyz, 1.0) * mine;
+                    spreads[k] += lobe.w * mine;
+                    normals[k] += vec4(normal.xyz, 1.0) * mine;
+                }
             }
         }
     }
