@@ -109,7 +109,7 @@ fn filters_are_compared_with_the_truth() {
 fn check_row(row: &Value, light: &str, texels: f64) {
     assert!(row["refused"].is_null() && row["flicker"].is_null(), "{row}");
     let (errors, cost) = (&row["errors"], &row["cost"]);
-    let all = ["rmse", "rel_l2", "color_error", "psnr", "flip"].map(|name| number(&errors[name]));
+    let all = ["rmse", "rel_l2", "color_error", "psnr", "flip", "energy"].map(|name| number(&errors[name]));
     assert!(all.iter().all(|v| *v > 0.0), "{errors}");
     let noise = number(&errors["noise"]);
     if light == "point" {
