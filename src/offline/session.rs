@@ -91,6 +91,7 @@ pub struct Session {
     meshes: HashMap<usize, MeshBuffers>,
     shown: Shown,
     setup: SetupTimes,
+    material_bytes: u64,
     record_ms: f64,
 }
 
@@ -110,6 +111,7 @@ impl Session {
         setup.push(("pipelines", milliseconds(clock)));
 
         let clock = Instant::now();
+        let others = headless.live_bytes();
         let mut materials: Vec<_> = world.materials.iter().map(|m| m.surface()).collect();
         if config.rate == crate::Rate::Bandwidth {
             let folder = lobe_cache::cache_folder();
@@ -122,6 +124,7 @@ impl Session {
         headless.submit(|cmd, memory| Ok(unsafe { renderer.record_materials(cmd, &materials, memory) }?))?;
         // Beside the work on the processor, with which the rest of it is told.
         let on_device = of_maps(&renderer)?;
+        let material_bytes = headless.live_bytes().saturating_sub(others);
         let others: f64 = on_device.iter().map(|(_, time)| time).sum();
         setup.push((crate::pass::materials::NAME, milliseconds(clock) - others));
         setup.extend(on_device);
@@ -135,7 +138,8 @@ impl Session {
 
         let clock = Instant::now();
         let shown = Shown::of(world, config.extent);
-        let mut session = Self { headless, renderer: Some(renderer), meshes: HashMap::new(), shown, setup, record_ms: 0.0 };
+        let (meshes, record_ms) = (HashMap::new(), 0.0);
+        let mut session = Self { headless, renderer: Some(renderer), meshes, shown, setup, material_bytes, record_ms };
         session.upload_objects(world, &mut HashMap::new())?;
         session.setup.push((MESHES, milliseconds(clock)));
         Ok(session)
@@ -314,6 +318,11 @@ impl Session {
     /// Bytes declared by each pass of the last frame.
     pub fn pass_bytes(&self) -> &[(&'static str, u64)] {
         self.renderer.as_ref().map_or(&[], Renderer::pass_bytes)
+    }
+
+    /// Bytes of device memory that the materials take: tables, textures, and the maps of the filter.
+    pub fn material_bytes(&self) -> u64 {
+        self.material_bytes
     }
 
     /// Set-up times.

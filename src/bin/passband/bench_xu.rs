@@ -6,7 +6,7 @@ use passband::offline::bench::xu::report::{Cost, Errors, Report, Row, SceneRepor
 
 const ERRORS: &str = "Errors against the truth, over pixels that surfaces cover wholly
 noise: the image's own, as a rel. L2; less noise: without what it and the truth's add to the error in the mean;
-preconv.: rel. L2 where the environment is looked up as it is convolved beforehand, without noise of its own";
+energy: mean radiance over the truth's; preconv.: rel. L2 where the environment is looked up as it is convolved beforehand, without noise of its own";
 
 const COSTS: &str = "Costs on the device (Xu et al. 2017, table 1)
 set-up: brdf_map and vmf_mips, on change; shading: filter and base (or shade), in every frame; 64x: one frame of filter point with 8
@@ -45,6 +45,7 @@ fn errors(scene: &SceneReport) -> String {
             of(row, &|e| format!("{:.4}", e.color_error)),
             of(row, &|e| format!("{:.2}", e.psnr)),
             of(row, &|e| format!("{:.4}", e.flip)),
+            of(row, &|e| format!("{:.3}", e.energy)),
             of(row, &|e| if e.directions > 0 { format!("{:.4}", e.noise) } else { "-".into() }),
             row.preconvolved.as_ref().map_or(String::new(), |e| format!("{:.4}", e.rel_l2)),
             row.flicker.map_or(String::new(), |f| format!("{:.4}", f.zoom)),
@@ -59,6 +60,7 @@ fn errors(scene: &SceneReport) -> String {
         "color",
         "PSNR",
         "FLIP",
+        "energy",
         "noise",
         "preconv.",
         "zoom flicker",

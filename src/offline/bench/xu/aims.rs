@@ -81,6 +81,7 @@ mod tests {
                 color_error: 0.0,
                 psnr: 20.0,
                 flip: 0.1,
+                energy: 1.0,
                 directions: 0,
                 noise: 0.0,
                 less_noise: rel_l2,

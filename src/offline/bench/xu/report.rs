@@ -107,6 +107,8 @@ pub struct Errors {
     pub psnr: f64,
     /// As [`Metrics::flip`].
     pub flip: f64,
+    /// Mean radiance over the truth's, over all channels: 1 where no energy is lost or won.
+    pub energy: f64,
     /// Directions a pixel; 0 where none are drawn.
     pub directions: u32,
     /// The still's own noise, as [`Metrics::rel_l2`].
@@ -141,7 +143,7 @@ pub struct Cost {
     pub over_lean: Option<Ratio>,
     /// Set-up a texel, in nanoseconds.
     pub ns_a_texel: Option<f64>,
-    /// Device memory beyond that of the filter `point`, a texel, mips included.
+    /// Device memory of the materials beyond that with the filter `point`, a texel, mips included.
     pub bytes_a_texel: Option<f64>,
 }
 
@@ -154,11 +156,11 @@ impl Row {
 }
 
 impl Errors {
-    /// `truth` is the truth's noise over the same pixels.
-    pub(super) fn new(metrics: &Metrics, directions: u32, noise: f64, truth: f64) -> Self {
+    /// Of a still with this noise; `truth` is the truth's, over the same pixels.
+    pub(super) fn new(metrics: &Metrics, energy: f64, directions: u32, [noise, truth]: [f64; 2]) -> Self {
         let Metrics { rmse, rel_l2, color_error, psnr, flip, .. } = *metrics;
         let less_noise = (rel_l2 * rel_l2 - noise * noise - truth * truth).max(0.0).sqrt();
-        Self { rmse, rel_l2, color_error, psnr, flip, directions, noise, less_noise }
+        Self { rmse, rel_l2, color_error, psnr, flip, energy, directions, noise, less_noise }
     }
 }
 

@@ -16,7 +16,7 @@ const DIRECTIONS: u32 = 256;
 /// The error over the noise that is low enough.
 const MARGIN: f64 = 10.0;
 /// Frames after which it is as it is.
-const MOST_FRAMES: u32 = 16;
+const MOST_FRAMES: u32 = 8;
 /// A pixel is judged if it is covered by this much: of truths, whose sums are rounded.
 const WHOLE: f32 = 0.9999;
 /// Of frames, whose numbers tell them from those that are timed.
@@ -127,12 +127,18 @@ pub(super) fn judge(stills: &mut [Still], truth: &Converged, rows: &mut [Row]) -
     let (picture, mask) = (truth.image().picture, mask(truth));
     let [a, b] = &truth.halves();
     let noise = quality::noise([a, b], &mask)?.rel_l2;
-    let error = |of: &Picture| quality::error(&[Frame { picture: of.clone(), coverage: Vec::new() }], &picture, &mask);
+    let sum = |of: &Picture| -> f64 {
+        let judged = of.rgb.iter().zip(&mask).filter(|(_, judged)| **judged);
+        judged.flat_map(|(c, _)| c).map(|v| f64::from(*v)).sum()
+    };
+    let errors = |of: &Picture, directions, own| -> Result<Errors> {
+        let metrics = quality::error(&[Frame { picture: of.clone(), coverage: Vec::new() }], &picture, &mask)?;
+        Ok(Errors::new(&metrics, sum(of) / sum(&picture), directions, [own, noise]))
+    };
     for still in stills {
         let Some(row) = rows.iter_mut().find(|row| row.filter == still.filter.name()) else { continue };
-        row.errors = Some(Errors::new(&error(&still.picture)?, still.directions, still.noise, noise));
-        let looked_up = still.preconvolved.as_ref().map(error).transpose()?;
-        row.preconvolved = looked_up.map(|metrics| Errors::new(&metrics, 0, 0.0, noise));
+        row.errors = Some(errors(&still.picture, still.directions, still.noise)?);
+        row.preconvolved = still.preconvolved.as_ref().map(|of| errors(of, 0, 0.0)).transpose()?;
     }
     Ok(())
 }

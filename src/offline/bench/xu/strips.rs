@@ -12,8 +12,8 @@ use crate::offline::metrics::{Exposure, Picture};
 use crate::sampling::luminance;
 use glam::DVec3;
 
-/// Filters beside a truth.
-const BESIDE: usize = 6;
+/// The most filters beside a truth.
+const MOST_BESIDE: usize = 7;
 /// What differences are multiplied with: those of filters are large.
 const GAIN: f64 = 2.0;
 /// Images a side of the truth's detail.
@@ -28,9 +28,12 @@ pub(super) fn strip(stage: &Stage<'_>, truth: &Converged, stills: &[Still], rows
     let mut detail = whole.detail(whole.busiest(PARTS), PARTS);
     detail.label = "its busiest part; beside it differences, 2 times".into();
     let mut tiles = Vec::new();
-    for some in stills.chunks(BESIDE) {
+    // Rows of nearly one length.
+    let rows_of_images = stills.len().div_ceil(MOST_BESIDE).max(1);
+    let beside = stills.len().div_ceil(rows_of_images).max(1);
+    for some in stills.chunks(beside) {
         let empty = || Tile { label: String::new(), rgb: vec![[255; 3]; whole.rgb.len()], ..whole };
-        let fill = |row: &mut Vec<Tile>| row.resize_with(BESIDE + 1, empty);
+        let fill = |row: &mut Vec<Tile>| row.resize_with(beside + 1, empty);
         let mut images = vec![whole.clone()];
         images.extend(some.iter().map(|still| photograph(still.filter.name().into(), &still.picture, exposure)));
         fill(&mut images);
@@ -46,7 +49,7 @@ pub(super) fn strip(stage: &Stage<'_>, truth: &Converged, stills: &[Still], rows
         Light::Point => ("point", "under point lights"),
         Light::Environment => ("environment", "under an environment"),
     };
-    Figure { name, title: format!("{} {light}", stage.world.name), columns: BESIDE + 1, tiles }
+    Figure { name, title: format!("{} {light}", stage.world.name), columns: beside + 1, tiles }
 }
 
 /// As the metrics display it.

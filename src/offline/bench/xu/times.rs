@@ -1,7 +1,7 @@
 //! What each filter costs: maps on change, shading in every frame, beside 64 samples a pixel (Xu et al. 2017, table 1).
 //!
 //! Frames of all filters and of the supersampled one alternate. They look the environment up as it is convolved beforehand, as
-//! in the paper; its convolution is the same for all and not counted. Maps are made anew before every frame.
+//! in the paper; its convolution is the same for all and not counted. Maps are made anew before every timed frame.
 
 use crate::gpu::timer::FrameTimings;
 use crate::offline::bench::runner::{Timed, WARM_UP, interleave};
@@ -31,21 +31,21 @@ pub(super) struct Costs {
     pub supersampling: Cost,
 }
 
-/// A session whose maps are made anew before every frame.
+/// A session whose maps are made anew before every timed frame.
 struct Subject<'a> {
     session: Session,
     world: &'a World,
     /// Absent for the supersampled one.
     filter: Option<Filter>,
-    /// After opening.
-    bytes: u64,
-    /// Of every frame.
+    rounds: u32,
+    /// Of every timed frame.
     set_up_ms: Vec<f64>,
 }
 
 impl Timed for Subject<'_> {
     fn frame(&mut self, seed: [u32; 2]) -> Result<()> {
-        if self.filter.is_some_and(|filter| filter.stored().is_some()) {
+        let timed = (WARM_UP..WARM_UP + self.rounds).contains(&seed[1]);
+        if timed && self.filter.is_some_and(|filter| filter.stored().is_some()) {
             let times = self.session.renew_materials(self.world)?;
             self.set_up_ms.push(times.iter().map(|(_, ms)| ms).sum());
         }
@@ -66,10 +66,7 @@ pub(super) fn measure(stage: &Stage<'_>, rows: &mut [Row], progress: &mut dyn Fn
     let subject = |filter: Option<Filter>, extent, estimator| -> Result<std::result::Result<Subject<'_>, String>> {
         let world = &stage.world;
         let session = open(world, &config(filter.unwrap_or_default(), extent, estimator), stage.device())?;
-        Ok(session.map(|session| {
-            let bytes = session.headless().live_bytes();
-            Subject { session, world, filter, bytes, set_up_ms: Vec::new() }
-        }))
+        Ok(session.map(|session| Subject { session, world, filter, rounds: stage.rounds, set_up_ms: Vec::new() }))
     };
     let extent = stage.config.extent;
     let mut estimator = (Estimator::Preconvolved, "preconvolved");
@@ -87,7 +84,6 @@ pub(super) fn measure(stage: &Stage<'_>, rows: &mut [Row], progress: &mut dyn Fn
     }
     let times = interleave(&mut subjects, stage.rounds, progress)?;
 
-    let rounds = stage.rounds as usize;
     let shading = |times: &[FrameTimings]| -> Vec<f64> {
         let passes = [filter::NAME, base::NAME, shade::NAME];
         times.iter().map(|t| t.passes.iter().filter(|p| passes.contains(&p.0)).map(|p| p.1).sum()).collect()
@@ -98,14 +94,14 @@ pub(super) fn measure(stage: &Stage<'_>, rows: &mut [Row], progress: &mut dyn Fn
         known.and_then(|i| times.get(i)).map(|times| shading(times))
     };
     let (lean, texels) = (named(LEAN), texels(&stage.world));
-    let plain = subjects.iter().find(|s| s.filter == Some(Filter::Point)).map_or(0, |s| s.bytes);
+    let plain = subjects.iter().find(|s| s.filter == Some(Filter::Point)).map_or(0, |s| s.session.material_bytes());
     let supersampled = times.first().map(|times| shading(times)).unwrap_or_default();
     let cost = |subject: &Subject<'_>, times: &[FrameTimings]| {
         let shade = shading(times);
-        let set_up: Vec<f64> = subject.set_up_ms.iter().skip(WARM_UP as usize).take(rounds).copied().collect();
-        let both: Vec<f64> = shade.iter().zip(&set_up).map(|(a, b)| a + b).collect();
+        let set_up = &subject.set_up_ms;
+        let both: Vec<f64> = shade.iter().zip(set_up).map(|(a, b)| a + b).collect();
         let has_maps = set_up.iter().any(|ms| *ms > 0.0);
-        let set_up_ms = has_maps.then(|| Summary::of(&set_up));
+        let set_up_ms = has_maps.then(|| Summary::of(set_up));
         let is_filter = subject.filter.is_some();
         let each = |total: f64| (has_maps && texels > 0).then(|| total / texels as f64);
         Cost {
@@ -116,7 +112,7 @@ pub(super) fn measure(stage: &Stage<'_>, rows: &mut [Row], progress: &mut dyn Fn
             gain_with_set_up: ratio_of_medians(&supersampled, if has_maps { &both } else { &shade }).filter(|_| is_filter),
             over_lean: lean.as_ref().and_then(|lean| ratio_of_medians(&shade, lean)).filter(|_| is_filter),
             ns_a_texel: set_up_ms.and_then(|ms| each(ms.median * 1e6)),
-            bytes_a_texel: each(subject.bytes.saturating_sub(plain) as f64),
+            bytes_a_texel: each(subject.session.material_bytes().saturating_sub(plain) as f64),
         }
     };
     let mut supersampling = None;
