@@ -191,7 +191,8 @@ impl<'a> Filtered<'a> {
         let constant =
             map.lobes().iter().map(|l| l.weight * l.kappa).sum::<f64>() * map.lobes_per_texel() as f64 / map.lobes().len() as f64;
         let (slots, stride) = filter.storage().layout(map.lobes_per_texel());
-        let mips = Mips::new(map.size(), slots * stride, |i, out| encode(filter.storage(), map.texel(i), map.normal(i), literal, out));
+        let mips =
+            Mips::new(map.size(), slots * stride, |i, out| encode(filter.storage(), map.texel(i), map.normal(i), literal, out));
         let division = if literal { Division::PRINTED } else { Division::default() };
         Self { filter, map, literal, division, constant, mips }
     }

@@ -131,15 +131,21 @@ fn code(place: Option<Place>) -> u32 {
     place.map_or(0, |(class, layer)| (layer << 3 | class) as u32 + 1)
 }
 
-/// The moments of `materials`, of which `bases` say what is filtered: one group for each size. Of each material its group, the
-/// first of its layers there and how many there are.
+/// A material's group, the first of its layers there and how many there are.
+struct GroupPlace {
+    group: usize,
+    first: Layers,
+    layers: Layers,
+}
+
+/// The moments of `materials`, of which `bases` say what is filtered: one group for each size, and each material's place.
 fn groups(
     materials: &[Material],
     bases: &[Option<Base>],
     sizes: Vec<[u32; 2]>,
     slots: &[Slots],
     filter: Filter,
-) -> (Vec<Group>, Vec<Option<(usize, [Layers; 2])>>) {
+) -> (Vec<Group>, Vec<Option<GroupPlace>>) {
     let mut groups: Vec<_> = sizes.into_iter().map(Group::new).collect();
     let mut place = |((material, base), slots): ((&Material, &Option<Base>), &Slots)| {
         let base = (*base)?;
@@ -148,7 +154,7 @@ fn groups(
         let parameter = Parameter::of(&material.model);
         let source = Source { normal: slots.normal, roughness, rule: rule(material), base, parameter };
         let layers = Layers::of(filter, &base);
-        Some((group, [groups.get_mut(group)?.place(source, layers), layers]))
+        Some(GroupPlace { group, first: groups.get_mut(group)?.place(source, layers), layers })
     };
     let places = materials.iter().zip(bases).zip(slots).map(&mut place).collect();
     (groups, places)
@@ -174,7 +180,7 @@ impl MapsUpload {
             .iter()
             .scan(classes.len(), |next, group| Some(std::mem::replace(next, *next + 1 + usize::from(group.layers.cells > 0))))
             .collect();
-        let place = |(group, [first, layers]): (usize, [Layers; 2])| {
+        let place = |GroupPlace { group, first, layers }: GroupPlace| {
             let class = *firsts.get(group)?;
             let cells = (layers.cells > 0).then_some(((class + 1, first.cells), layers.cells));
             Some(MomentsPlace { moments: ((class, first.moments), layers.moments), cells })
