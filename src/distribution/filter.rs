@@ -93,6 +93,11 @@ impl Filter {
         matches!(self.storage(), Storage::Cells(_))
     }
 
+    /// Whether its lobes are Gaussians of slopes.
+    pub fn has_slopes(self) -> bool {
+        matches!(self.storage(), Storage::Slopes { .. })
+    }
+
     /// How its lobes are masked.
     pub fn masking(self) -> Masking {
         if self == Self::Leadr { Masking::Slopes } else { Masking::Cavities }

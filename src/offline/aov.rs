@@ -36,9 +36,11 @@ pub enum Aov {
     Samples,
     /// Radiance from pre-convolved light.
     Base,
+    /// Lobes that the filter found, 0 where the material's own stay.
+    Lobes,
 }
 
-const ALL: [(&str, Aov); 14] = [
+const ALL: [(&str, Aov); 15] = [
     ("depth", Aov::Depth),
     ("normal", Aov::Normal),
     ("material", Aov::Material),
@@ -53,8 +55,9 @@ const ALL: [(&str, Aov); 14] = [
     ("shaded", Aov::Shaded),
     ("samples", Aov::Samples),
     ("base", Aov::Base),
+    ("lobes", Aov::Lobes),
 ];
-const LATER: [&str; 2] = ["lobes", "mip"];
+const LATER: [&str; 1] = ["mip"];
 
 impl std::str::FromStr for Aov {
     type Err = Error;
@@ -177,6 +180,22 @@ impl Aov {
                     (name, values.iter().zip(&mask).map(|(v, m)| if *m > 0.0 { *v } else { 0.0 }).collect())
                 };
                 Ok(radiance.into_iter().map(covered).collect())
+            }
+            Self::Lobes => {
+                if config.filter.lobe_layers() == 0 {
+                    let expected = "a --filter that reads normals through mips beside it";
+                    return Err(Error::argument("--aov lobes", expected, config.filter.name()));
+                }
+                let (bytes, ..) = session.image("lobes")?;
+                let texels: Vec<[u32; 4]> = bytemuck::pod_collect_to_vec(&bytes);
+                let slopes = config.filter.stored().is_some_and(crate::distribution::Filter::has_slopes);
+                // The first that is all 0 ends the list; a Gaussian of slopes takes two layers.
+                let (samples, layers) = (covered.words.len(), if slopes { 2 } else { 1 });
+                let there = |i: usize, layer: usize| texels.get(layer * samples + i).is_some_and(|t| *t != [0; 4]);
+                let most = config.filter.lobe_layers() as usize / layers;
+                let count = |i: usize| (0..most).take_while(|k| there(i, k * layers)).count() as u32;
+                let counts = covered.of((0..samples).map(count).collect()).map(|t| t[0] as f32);
+                scalar(counts.iter().zip(mask).map(|(count, mask)| count * mask).collect())
             }
             Self::Shaded | Self::Samples => {
                 let mut shaded = vec![0; covered.words.len()];

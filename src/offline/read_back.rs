@@ -10,6 +10,7 @@ use crate::offline::error::{Error, Result};
 use crate::offline::session::{Session, closed};
 use crate::renderer::Renderer;
 use ash::vk;
+use std::ops::Range;
 
 /// Size and texels of each level.
 pub type MomentLevels = Vec<([u32; 2], Vec<[f32; 4]>)>;
@@ -38,7 +39,7 @@ impl Session {
         Ok(bytemuck::pod_collect_to_vec(&bytes))
     }
 
-    /// The texels of one of the renderer's own images after the last frame, in its own format and extent.
+    /// The texels of one of the renderer's own images after the last frame, layer by layer, in its own format and extent.
     ///
     /// # Errors
     /// [`Error::Argument`] for a name that the configuration has no image of.
@@ -73,7 +74,7 @@ impl Session {
                         if let Some((image, _)) =
                             renderer.moments(material).and_then(|[moments, cells]| [moments, cells][i].clone())
                         {
-                            copy_level(rec, image, target, level, layer);
+                            copy_layers(rec, image, target, level, layer..layer + 1);
                         }
                     })?;
                     Ok(([width, height], bytemuck::pod_collect_to_vec(&bytes)))
@@ -113,10 +114,10 @@ impl Session {
 }
 
 fn copy_image(rec: &mut Recorder<'_>, image: &Image, target: &Buffer) {
-    copy_level(rec, image, target, 0, 0);
+    copy_layers(rec, image, target, 0, 0..image.desc.layers.unwrap_or(1));
 }
 
-fn copy_level(rec: &mut Recorder<'_>, image: &Image, target: &Buffer, level: u32, layer: u32) {
+fn copy_layers(rec: &mut Recorder<'_>, image: &Image, target: &Buffer, level: u32, range: Range<u32>) {
     rec.image(image, Access::TRANSFER_READ);
     rec.buffer(target, Access::TRANSFER_WRITE);
     rec.flush();
@@ -124,8 +125,8 @@ fn copy_level(rec: &mut Recorder<'_>, image: &Image, target: &Buffer, level: u32
     let layers = vk::ImageSubresourceLayers {
         aspect_mask: image.desc.aspect(),
         mip_level: level,
-        base_array_layer: layer,
-        layer_count: 1,
+        base_array_layer: range.start,
+        layer_count: range.end - range.start,
     };
     let extent = vk::Extent3D { width, height, depth: 1 };
     let region = vk::BufferImageCopy { image_subresource: layers, image_extent: extent, ..Default::default() };

@@ -115,8 +115,10 @@ fn preconvolved(stage: &Stage<'_>, config: &Config) -> Result<Option<Picture>> {
 
 /// Lobes of the session's last frame, a covered pixel.
 fn lobes(session: &mut Session, config: &Config) -> Result<Option<f64>> {
-    let Ok(aov) = "lobes".parse::<Aov>() else { return Ok(None) };
-    let Some((_, values)) = aov.read(session, config)?.into_iter().next() else { return Ok(None) };
+    if config.filter.stored().is_none() {
+        return Ok(None);
+    }
+    let Some((_, values)) = Aov::Lobes.read(session, config)?.into_iter().next() else { return Ok(None) };
     let covered = Frame::read(session)?.coverage;
     let each: Vec<f64> = values.iter().zip(covered).filter(|(_, a)| *a > 0.0).map(|(v, _)| f64::from(*v)).collect();
     Ok((!each.is_empty()).then(|| each.iter().sum::<f64>() / each.len() as f64))
