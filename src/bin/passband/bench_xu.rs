@@ -11,7 +11,7 @@ energy: mean radiance over the truth's; preconv.: rel. L2 where the environment 
 const COSTS: &str = "Costs on the device (Xu et al. 2017, table 1)
 set-up: brdf_map and vmf_mips, on change; shading: filter and base (or shade), in every frame; 64x: one frame of filter point with 8
 times the pixels a side; 64x over ...: its shading over the filter's, alone and with set-up; of LEAN's: shading over the filter lean's;
-ns, bytes: of set-up, and of memory beyond that of filter point, a texel of the maps";
+ns, bytes: of set-up, and of the materials' memory beyond that with filter point (maps with mips, tables of more roughnesses), a texel";
 
 /// The whole report.
 pub fn text(report: &Report) -> String {

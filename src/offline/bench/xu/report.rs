@@ -143,7 +143,8 @@ pub struct Cost {
     pub over_lean: Option<Ratio>,
     /// Set-up a texel, in nanoseconds.
     pub ns_a_texel: Option<f64>,
-    /// Device memory of the materials beyond that with the filter `point`, a texel, mips included.
+    /// Device memory of the materials beyond that with the filter `point`, a texel: maps with their mips, and importance tables
+    /// where filters need those of more roughnesses.
     pub bytes_a_texel: Option<f64>,
 }
 
