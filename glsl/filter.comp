@@ -28,6 +28,8 @@ layout(constant_id = 7) const uint FILTER = 0u;
 layout(constant_id = 8) const uint LOBES = 0u;
 // Most look-ups along the longer axis of a footprint.
 layout(constant_id = 9) const uint ANISOTROPY = 1u;
+// Whether cells are in camera space, each object's own.
+layout(constant_id = 10) const bool CAMERA = false;
 
 struct MapRecord {
     uvec4 places;        // albedo, specular, normal, roughness: 0 for none, else (layer << 3 | class) + 1
@@ -57,6 +59,9 @@ layout(set = 2, binding = 9) uniform sampler2DArray textures_7;
 layout(set = 2, binding = 10, rgba32f) uniform writeonly image2D normals;   // shading normal; tangent as tangent.glsl encodes it
 layout(set = 2, binding = 11, rgba32ui) uniform writeonly uimage2D factors; // as factors.glsl packs them
 layout(set = 2, binding = 12, rgba32f) uniform writeonly image2DArray lobes; // as lobes.glsl reads them
+layout(set = 2, binding = 13, std430) readonly buffer Objects {
+    uint objects[]; // in camera space, by object: its cells, as `MapRecord::cells`
+};
 
 // What a pixel covers of a map: look-ups along the longer axis, at a level whose texels are as large as the step from one to the
 // next; with one look-up, as large as the longer axis.
@@ -164,7 +169,7 @@ float geometric_kernel(ivec2 p, vec3 n) {
 
 // A sample's lobes as they are found.
 struct Found {
-    mat3 frame;      // world from tangent frame
+    mat3 frame;      // world from the frame of what is found: the tangent frame, or the camera's for its cells
     float kernel;    // what widens them
     uint count;
     float sharpest;  // concentration of those that matter
@@ -225,8 +230,9 @@ Cell both(Cell a, Cell b) {
     return Cell(a.sum + b.sum, a.spread + b.spread);
 }
 
-// The cells of what a pixel covers: between base texels, which have their lobes as they are, and the levels of cells.
-void gather(MapRecord record, vec2 uv, Reach r, uint lobe_layer, out Cell cells[CELLS]) {
+// The cells of what a pixel covers: between base texels, which have their lobes as they are, and the levels of cells. `turn` is
+// the cells' frame from the pixel's tangent frame, where these differ.
+void gather(MapRecord record, uint code, mat3 turn, vec2 uv, Reach r, uint lobe_layer, out Cell cells[CELLS]) {
     for (uint i = 0u; i < CELLS; ++i) {
         cells[i] = Cell(vec4(0.0), 0.0);
     }
@@ -234,16 +240,32 @@ void gather(MapRecord record, vec2 uv, Reach r, uint lobe_layer, out Cell cells[
     for (float tap = 0.0; tap < r.taps; ++tap) {
         vec2 at = reach_tap(r, uv, tap);
         for (uint i = 0u; i < filter_cells(FILTER); ++i) {
-            cells[i].sum += fetch(CELL_CLASSES, record.cells, i, at, level) * (coarse / r.taps);
+            cells[i].sum += fetch(CELL_CLASSES, code, i, at, level) * (coarse / r.taps);
         }
         if (FILTER == FILTER_VMF) {
-            vec4 low = fetch(CELL_CLASSES, record.cells, CELLS, at, level) * (coarse / r.taps);
-            vec4 high = fetch(CELL_CLASSES, record.cells, CELLS + 1u, at, level) * (coarse / r.taps);
+            vec4 low = fetch(CELL_CLASSES, code, CELLS, at, level) * (coarse / r.taps);
+            vec4 high = fetch(CELL_CLASSES, code, CELLS + 1u, at, level) * (coarse / r.taps);
             for (uint i = 0u; i < 4u; ++i) {
                 cells[i].spread += low[i];
                 cells[i + 4u].spread += high[i];
             }
         }
+    }
+    if (CAMERA) {
+        // What texels without a frame lack; where all do, the base texels stand for all.
+        float covered = 0.0;
+        for (uint i = 0u; i < CELLS; ++i) {
+            covered += cells[i].sum.w;
+        }
+        float factor = covered > LEAST_WEIGHT ? coarse / covered : 0.0;
+        for (uint i = 0u; i < CELLS; ++i) {
+            cells[i].sum *= factor;
+            cells[i].spread *= factor;
+        }
+        coarse = factor > 0.0 ? coarse : 0.0;
+    }
+    for (float tap = 0.0; tap < r.taps; ++tap) {
+        vec2 at = reach_tap(r, uv, tap);
         vec2 place = vec2(at.x, 1.0 - at.y) * r.size - 0.5, first = floor(place), part = place - first;
         for (uint k = 0u; k < 4u; ++k) {
             vec2 corner = vec2(k & 1u, k >> 1), share = mix(1.0 - part, part, corner);
@@ -251,6 +273,7 @@ void gather(MapRecord record, vec2 uv, Reach r, uint lobe_layer, out Cell cells[
             for (uint j = 0u; j < record.count; ++j) {
                 vec4 lobe = fetch(MOMENT_CLASSES, record.moments, lobe_layer + j, vec2(centre.x, 1.0 - centre.y), 0.0);
                 float weight = record.weights[j] * share.x * share.y * ((1.0 - coarse) / r.taps);
+                lobe.xyz = CAMERA ? moments_turned(turn, lobe.xyz) : lobe.xyz;
                 uint cell = moments_cell(filter_cells(FILTER), vec3(lobe.xy, 1.0 - lobe.z));
                 cells[cell].sum += vec4(lobe.xyz, 1.0) * weight;
                 cells[cell].spread += lobe.w * weight;
@@ -263,9 +286,17 @@ void gather(MapRecord record, vec2 uv, Reach r, uint lobe_layer, out Cell cells[
 void decode(ivec2 p, MapRecord record, vec2 uv, vec4 footprint, inout Found f) {
     Reach r = reach_of(MOMENT_CLASSES, record.moments, footprint);
     uint layer = record.upright != 0u ? 0u : 1u;
+    mat3 tangent = f.frame;
     if (filter_of_cells(FILTER)) {
+        uint code = record.cells;
+        mat3 turn = mat3(1.0);
+        if (CAMERA && code != 0u) {
+            code = objects[gbuffer_object(p)];
+            f.frame = mat3(frame.world_from_view[0].xyz, frame.world_from_view[1].xyz, frame.world_from_view[2].xyz);
+            turn = transpose(f.frame) * tangent;
+        }
         Cell cells[CELLS];
-        gather(record, uv, r, layer, cells);
+        gather(record, code, turn, uv, r, layer, cells);
         Cell all = Cell(vec4(0.0), 0.0);
         for (uint i = 0u; i < filter_cells(FILTER); ++i) {
             all = both(all, cells[i]);
@@ -307,6 +338,7 @@ void decode(ivec2 p, MapRecord record, vec2 uv, vec4 footprint, inout Found f) {
         }
     }
     if (record.upright == 0u) {
+        f.frame = tangent;
         f.mean = look_up(MOMENT_CLASSES, record.moments, 0u, uv, r).xyz;
     }
 }
@@ -341,11 +373,7 @@ void main() {
         n = record.places.z != 0u && t.w != 0.0 ? bent : n;
     }
     if (LOBES != 0u) {
-        vec3 x, y;
-        tangent_basis(n, x, y);
-        x = t.w != 0.0 ? t.xyz : x;
-        y = t.w != 0.0 ? cross(n, x) * t.w : y;
-        Found found = Found(mat3(x, y, n), f.kernel, 0u, 0.0, vec3(0.0));
+        Found found = Found(tangent_frame(n, t), f.kernel, 0u, 0.0, vec3(0.0));
         if (record.moments != 0u) {
             decode(p, record, uv, footprint, found);
         } else if (filter_of_slopes(FILTER)) {

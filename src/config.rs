@@ -152,6 +152,31 @@ impl Filter {
     }
 }
 
+/// The frame whose cells of directions filters with cells gather lobes in. Lobes of one cell become one.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Bins {
+    /// The surface's tangent frame: made once a set of materials, whatever geometry and camera do.
+    #[default]
+    Tangent,
+    /// The camera's, of each draw that is shown, made anew in every frame (Xu et al. 2017, section 4): the cells hold what the mesh
+    /// curves within a texel, too, and lobes change their cells as the camera turns. Needs [`Renderer::reserve_cells`], texture
+    /// coordinates in the unit square under tiling 1 that no two places of a draw share ([`crate::distribution::chart`]), and an
+    /// object number of its own for every draw.
+    ///
+    /// [`Renderer::reserve_cells`]: crate::Renderer::reserve_cells
+    Camera,
+}
+
+impl Bins {
+    /// The name by which they are asked for.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Tangent => "tangent",
+            Self::Camera => "camera",
+        }
+    }
+}
+
 /// Lobes of a material that filters take apart.
 pub const MOST_BASE_LOBES: usize = 4;
 
@@ -199,6 +224,8 @@ pub struct Config {
     pub eps: f64,
     /// How materials are read.
     pub filter: Filter,
+    /// Where filters with cells have these. [`Bins::Camera`] asks for such a filter, and for draws.
+    pub bins: Bins,
     /// Most look-ups along the longer axis of what a pixel covers of a map, 1 to 16.
     pub anisotropy: u32,
     /// Whether the mesh's curvature widens lobes as [`Filter::Tk`] does, whatever the filter.
@@ -234,6 +261,7 @@ impl Config {
             combine: Combine::default(),
             eps: EPS,
             filter: Filter::default(),
+            bins: Bins::default(),
             anisotropy: 1,
             geometric: false,
             directions: 64,
@@ -314,6 +342,12 @@ impl Config {
         )?;
         check((1..=256).contains(&self.probes), "probes", "1 to 256", self.probes.to_string())?;
         check((1..=16).contains(&self.anisotropy), "anisotropy", "1 to 16", self.anisotropy.to_string())?;
+        if self.bins == Bins::Camera {
+            let expected = "tangent, unless the filter is vmf4, vmf8 or vmf";
+            check(self.filter.has_cells(), "bins", expected, format!("camera with {}", self.filter.name()))?;
+            let draws = matches!(self.gbuffer, GBufferSource::Draws);
+            check(draws, "bins", "tangent, unless the G-buffer is made of draws", "camera with the host's G-buffer".into())?;
+        }
         check((1e-3..=0.1).contains(&self.eps), "eps", "0.001 to 0.1", self.eps.to_string())?;
         let rate = self.samples_per_cycle.unwrap_or(1.0);
         check(rate > 0.0 && rate.is_finite(), "samples_per_cycle", "a finite number > 0", rate.to_string())?;

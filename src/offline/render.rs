@@ -204,6 +204,7 @@ pub(super) fn report(
         ("rate", json!(settings.rate())),
         ("lmax", json!(config.lmax)),
         ("filter", json!(config.filter.name())),
+        ("bins", json!(config.bins.name())),
         ("probes", json!(config.probes)),
         ("spc", json!(config.samples_per_cycle)),
         ("operator", json!(format!("{:?}", config.operator).to_lowercase())),

@@ -19,7 +19,7 @@ impl Check<'_> {
         self.each(&s.lmax, |c, v| c.require(*v.get_ref() <= 5, &v.span(), "a level from 0 to 5", v.get_ref()))?;
         self.each(&s.anisotropy, |c, v| c.number(v, "1 to 16", |v| (1.0..=16.0).contains(&v)))?;
         self.each(&s.lod_bias, |c, v| c.number(v, "-16 to 16", |v| v.abs() <= 16.0))?;
-        let all = [span(&s.bins), span(&s.eps0), span(&s.eps1), span(&s.anisotropy), span(&s.lod_bias)];
+        let all = [span(&s.eps0), span(&s.eps1), span(&s.anisotropy), span(&s.lod_bias)];
         self.later.extend(all.into_iter().flatten());
         Ok(())
     }

@@ -1,6 +1,6 @@
 //! Scene files: TOML in, a resolved [`World`] out.
 
-use crate::Config;
+use crate::{Bins, Config};
 use crate::frequency::allocation::Allocation;
 use crate::frequency::operators::{Combine, Operator};
 use crate::offline::animation::AnimatedWorld;
@@ -109,6 +109,10 @@ impl Scene {
                 _ => base.combine,
             },
             eps: settings.eps.as_ref().map_or(base.eps, |v| *v.get_ref()),
+            bins: match settings.bins.as_ref().map(|v| v.get_ref().as_str()) {
+                Some("camera") => Bins::Camera,
+                _ => base.bins,
+            },
             geometric: settings.geometric.as_ref().map_or(base.geometric, |v| *v.get_ref()),
             directions: settings.budget.as_ref().map_or(base.directions, |v| *v.get_ref()),
             allocation: {
