@@ -19,8 +19,8 @@ use crate::pass::gbuffer;
 use crate::pass::materials::{MaterialBridge, MaterialImages};
 use crate::pass::object_cells::ObjectCells;
 use crate::pass::{
-    FrameUniform, allocate, bandwidth, base, classify, curvature, filter, level, luminance, pyramid, resolve, shade, texture_space,
-    tonemap, upsample, vmf_mips,
+    FrameUniform, allocate, bandwidth, base, classify, curvature, filter, level, luminance, pyramid, resolve, shade,
+    texture_space, tonemap, upsample, vmf_mips,
 };
 use crate::passes::{Passes, Sampled};
 use crate::plan::{Directions, LIGHT_BYTES};

@@ -28,12 +28,8 @@ const DEPTH: vk::Format = vk::Format::D32_SFLOAT;
 pub(crate) const NO_TANGENT: [u8; 16] = [0; 16];
 
 /// Formats of the streams of a [`Draw`], in the order in which [`Draw::record`] binds them.
-pub(crate) const STREAMS: [vk::Format; 4] = [
-    vk::Format::R32G32B32_SFLOAT,
-    vk::Format::R32G32B32_SFLOAT,
-    vk::Format::R32G32_SFLOAT,
-    vk::Format::R32G32B32A32_SFLOAT,
-];
+pub(crate) const STREAMS: [vk::Format; 4] =
+    [vk::Format::R32G32B32_SFLOAT, vk::Format::R32G32B32_SFLOAT, vk::Format::R32G32_SFLOAT, vk::Format::R32G32B32A32_SFLOAT];
 
 /// One tangent of zero length, for all vertices of draws without.
 pub(crate) fn no_tangent(build: &mut Build<'_>) -> Result<Buffer> {

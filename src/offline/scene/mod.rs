@@ -1,12 +1,12 @@
 //! Scene files: TOML in, a resolved [`World`] out.
 
-use crate::{Bins, Config};
 use crate::frequency::allocation::Allocation;
 use crate::frequency::operators::{Combine, Operator};
 use crate::offline::animation::AnimatedWorld;
 use crate::offline::error::{At, Error, Result};
 use crate::offline::input;
 use crate::offline::world::World;
+use crate::{Bins, Config};
 use builtins::BUILTINS;
 use std::path::{Path, PathBuf};
 
