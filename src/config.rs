@@ -158,10 +158,10 @@ pub enum Bins {
     /// The surface's tangent frame: made once a set of materials, whatever geometry and camera do.
     #[default]
     Tangent,
-    /// The camera's, of each draw that is shown, made anew in every frame (Xu et al. 2017, section 4): the cells hold what the mesh
-    /// curves within a texel, too, and lobes change their cells as the camera turns. Needs [`Renderer::reserve_cells`], texture
-    /// coordinates in the unit square under tiling 1 that no two places of a draw share ([`crate::distribution::chart`]), and an
-    /// object number of its own for every draw.
+    /// The camera's, of each draw that is shown, made anew in every frame (Xu et al. 2017, section 4): lobes change their cells as
+    /// the camera turns, and these hold what the mesh curves within a texel, too, so that [`Config::geometric`] counts it twice.
+    /// Needs [`Renderer::reserve_cells`], texture coordinates in the unit square under tiling 1 that no two places of a draw share
+    /// ([`crate::distribution::chart`], which a host asks itself), and an object number of its own for every draw.
     ///
     /// [`Renderer::reserve_cells`]: crate::Renderer::reserve_cells
     Camera,

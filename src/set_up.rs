@@ -100,13 +100,13 @@ impl Renderer {
         Ok(bag)
     }
 
-    /// Makes room for the cells of `draws` with [`Bins::Camera`], before the frames that show them, or some of them: by the material
-    /// and the number of each. Where there is just that room it stays; nothing happens with [`Bins::Tangent`]. The bag holds the
-    /// former room.
+    /// Makes room for the cells of `draws` with [`Bins::Camera`], before the frames that show them, or some of them: by the
+    /// material and the number of each. Where there is just that room it stays; nothing happens with [`Bins::Tangent`]. The bag
+    /// holds the former room.
     ///
     /// # Errors
-    /// [`Error::CallOrder`] before [`Self::record_materials`]; [`Error::InvalidInput`] for draws that cannot be encoded or that share
-    /// a number; [`Error::Allocation`], or as [`Self::new`] for more layers than an image has. The former room stays then.
+    /// [`Error::CallOrder`] before [`Self::record_materials`]; [`Error::InvalidInput`] for draws that cannot be encoded or that
+    /// share a number; [`Error::Allocation`], or as [`Self::new`] for more layers than an image has. The former room stays then.
     pub fn reserve_cells(&mut self, draws: &[Draw], memory: &mut dyn HostAllocator) -> Result<Retired> {
         let mut bag = Retired::default();
         let (Bins::Camera, Some((_, mips))) = (self.config.bins, &self.passes.moments) else { return Ok(bag) };

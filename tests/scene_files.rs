@@ -1,11 +1,11 @@
 //! Scene files: every key is accepted or not supported yet, everything else is refused with its line.
 #![cfg(feature = "offline")]
 
-use passband::Light;
 use passband::offline::error::{At, Error};
 use passband::offline::scene::Scene;
 use passband::offline::world::World;
 use passband::reflectance::Model;
+use passband::{Bins, Light};
 use std::path::Path;
 
 /// The smallest valid scene, with places to add to: line 3, 6, 9 and after 11.
@@ -463,6 +463,10 @@ fn settings_reach_the_frame() {
     assert_eq!(load("combine = 'mean'").combine, Combine::Mean);
     assert_eq!(load("combine = 'max'").combine, Combine::Max);
     assert_eq!((load("lmax = 5").lmax, load("geometric = true").geometric), (5, true));
+    assert_eq!(
+        ["bins = 'camera'", "bins = 'tangent'", ""].map(|text| load(text).bins),
+        [Bins::Camera, Bins::Tangent, Bins::Tangent]
+    );
     assert_eq!((load("eps = 0.02").eps, load("").eps), (0.02, 0.01));
     assert_eq!((load("budget = 32").directions, load("np_rule = 'sqrt'").allocation.name()), (32, "sqrt"));
     let none = load("");

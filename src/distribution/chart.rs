@@ -13,7 +13,8 @@ const SLACK: f64 = 1e-3;
 const POINTS: [DVec2; 2] = [DVec2::new(0.5, 0.5), DVec2::new(0.6234, 0.5789)];
 
 /// Refuses meshes whose texture coordinates leave the unit square, or with two triangles over the centre of one texel of a map of
-/// `size`, both sides above 0, or over one other point of it. `field` says in the error whose mesh it is. Triangles without area have no texels.
+/// `size`, both sides above 0, or over one other point of it. `field` says in the error whose mesh it is. Triangles without area
+/// have no texels.
 ///
 /// # Errors
 /// [`Error::InvalidInput`] with the triangle and what is wrong with it.

@@ -145,6 +145,9 @@ pub(super) fn code(place: Option<Place>) -> u32 {
     place.map_or(0, |(class, layer)| (layer << 3 | class) as u32 + 1)
 }
 
+/// A group, the first of a material's layers there and how many there are.
+type Placed = (usize, [Layers; 2]);
+
 /// The moments of `materials`, of which `bases` say what is filtered: one group for each size. Of each material its group, the
 /// first of its layers there and how many there are. Cells of objects are none of the group's.
 fn groups(
@@ -153,7 +156,7 @@ fn groups(
     sizes: Vec<[u32; 2]>,
     slots: &[Slots],
     reading: &Reading<'_>,
-) -> (Vec<Group>, Vec<Option<(usize, [Layers; 2])>>) {
+) -> (Vec<Group>, Vec<Option<Placed>>) {
     let mut groups: Vec<_> = sizes.into_iter().map(Group::new).collect();
     let mut place = |((material, base), slots): ((&Material, &Option<Base>), &Slots)| {
         let base = (*base)?;
@@ -198,20 +201,20 @@ impl MapsUpload {
         };
         let places: Vec<_> = places.into_iter().map(|p| p.and_then(place)).collect();
 
-        let divided = |(i, ((place, base), material)): (usize, ((&Option<MomentsPlace>, &Option<Base>), &Material))| {
-            let Some((((moments, first), ((cells, _), layers)), base)) =
-                place.and_then(|p| Some((p.moments.0, p.cells?))).zip(*base).filter(|_| camera)
-            else {
-                return Ok(None);
+        let mut divided = Vec::new();
+        for (i, ((place, base), material)) in places.iter().zip(&bases).zip(materials).enumerate() {
+            let of_objects = place.filter(|_| camera).and_then(|p| Some((p.moments.0, p.cells?))).zip(*base);
+            let Some((((moments, first), ((cells, _), layers)), base)) = of_objects else {
+                divided.push(None);
+                continue;
             };
             if material.maps.tiling != [1.0; 2] {
                 let (field, got) = (format!("materials[{i}].maps.tiling"), format!("{:?}", material.maps.tiling));
                 return Err(Error::invalid(field, "[1.0, 1.0], as bins are camera", got));
             }
             let size = groups.get(moments - classes.len()).map_or([1; 2], |group| group.size);
-            Ok(Some(Divided { moments, cells, size, lobes: vmf_mips::Lobes::of(&base, first), layers }))
-        };
-        let divided = places.iter().zip(&bases).zip(materials).enumerate().map(divided).collect::<Result<Vec<_>>>()?;
+            divided.push(Some(Divided { moments, cells, size, lobes: vmf_mips::Lobes::of(&base, first), layers }));
+        }
 
         let (mut uses, mut unfiltered) = (Uses::default(), false);
         let mut records = Vec::with_capacity(materials.len());

@@ -183,11 +183,11 @@ impl VmfMips {
         rec.end();
     }
 
-    /// The levels of an image above its first.
+    /// The levels of an image above its first. Where bytes count, in frames, the pass has declared it before.
     fn record_levels(&self, rec: &mut Recorder<'_>, image: &Image, sets: &[vk::DescriptorSet]) {
         for (level, set) in (1..).zip(sets) {
             // Levels are views of their own: none is read and written through one binding.
-            rec.image(image, Access::COMPUTE_ATOMIC);
+            rec.again(image, Access::COMPUTE_ATOMIC);
             rec.flush();
             self.levels.bind_set(rec, *set, &());
             let [x, y, _] = image.desc.level_extent(level);
