@@ -8,6 +8,8 @@
 layout(local_size_x = 8, local_size_y = 8) in;
 // FILTER_* of moments.glsl.
 layout(constant_id = 0) const uint FILTER = 0u;
+// Whether lobes and normals make one by equations 13 and 14, which are for small angles, and its length is by equation 9.
+layout(constant_id = 1) const bool LITERAL = false;
 layout(set = 2, binding = 0) uniform sampler2DArray normals;   // x and y
 layout(set = 2, binding = 1) uniform sampler2DArray roughness; // a value
 layout(set = 2, binding = 2, rgba32f) uniform writeonly image2DArray moments;
@@ -100,7 +102,12 @@ void main() {
             turned = x * local.x + y * local.y + z * local.z;
             turned.z = 1.0 - turned.z;
         }
-        float spread = lost + kept * (roughness_layer < 0 ? base[i].w : of_map);
+        float own = roughness_layer < 0 ? base[i].w : of_map;
+        float spread = lost + kept * own;
+        if (LITERAL) {
+            float kappa = vmf_concentration(own), exponent = max(kappa - 1.0, 0.0), of_normals = vmf_literal_concentration(off);
+            spread = vmf_literal_spread(1.0 + (off < VMF_LEAST_SPREAD ? exponent : of_normals * exponent / (of_normals + exponent)));
+        }
         vec4 a, b;
         encode(turned, spread, a, b);
         float weight = filter_merges(FILTER) ? weights[i] : 1.0;

@@ -8,7 +8,7 @@
 #include "tangent.glsl"
 #include "factors.glsl"
 #include "moments.glsl"
-#include "oct.glsl"
+#include "found.glsl"
 #include "roughness.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
@@ -26,10 +26,16 @@ layout(constant_id = 6) const uint CELL_CLASSES = 0u;
 layout(constant_id = 7) const uint FILTER = 0u;
 // Layers of `lobes`; 0 where the filter has no lobes of its own.
 layout(constant_id = 8) const uint LOBES = 0u;
-// Most look-ups along the longer axis of a footprint.
+// Most look-ups along the longer axis of a footprint, and what is added to their level.
 layout(constant_id = 9) const uint ANISOTROPY = 1u;
+layout(constant_id = 10) const float LOD_BIAS = 0.0;
+// Whether concentrations follow from lengths by the paper's equation 8, and the lengths below which cells are divided; 0 to go by
+// their spread.
+layout(constant_id = 11) const bool LITERAL = false;
+layout(constant_id = 12) const float LENGTH_OF_ONE = 0.0;
+layout(constant_id = 13) const float LENGTH_OF_QUARTERS = 0.0;
 // Whether cells are in camera space, each object's own.
-layout(constant_id = 10) const bool CAMERA = false;
+layout(constant_id = 14) const bool CAMERA = false;
 
 struct MapRecord {
     uvec4 places;        // albedo, specular, normal, roughness: 0 for none, else (layer << 3 | class) + 1
@@ -43,7 +49,7 @@ struct MapRecord {
     uint count;          // of them; 0 for those that stay as they are
     uint upright;        // whether all are about the normal
     float concentration; // of the one lobe of a material without maps of normals and roughness
-    uint unused;
+    float facing;        // mean cosine of the lobes' directions to the normal
 };
 layout(set = 2, binding = 1, std430) readonly buffer Maps {
     MapRecord maps[]; // by material
@@ -58,7 +64,7 @@ layout(set = 2, binding = 8) uniform sampler2DArray textures_6;
 layout(set = 2, binding = 9) uniform sampler2DArray textures_7;
 layout(set = 2, binding = 10, rgba32f) uniform writeonly image2D normals;   // shading normal; tangent as tangent.glsl encodes it
 layout(set = 2, binding = 11, rgba32ui) uniform writeonly uimage2D factors; // as factors.glsl packs them
-layout(set = 2, binding = 12, rgba32f) uniform writeonly image2DArray lobes; // as lobes.glsl reads them
+layout(set = 2, binding = 12, rgba32ui) uniform writeonly uimage2DArray lobes; // as found.glsl packs them
 layout(set = 2, binding = 13, std430) readonly buffer Objects {
     uint objects[]; // in camera space, by object: its cells, as `MapRecord::cells`
 };
@@ -90,7 +96,7 @@ Reach reach_of(uint classes, uint code, vec4 footprint) {
     vec2 x = footprint.xy * size, y = footprint.zw * size;
     float xx = dot(x, x), yy = dot(y, y), major = max(max(xx, yy), 1.0), minor = max(min(xx, yy), 1.0);
     float taps = clamp(ceil(sqrt(major / minor) - 1e-3), 1.0, float(ANISOTROPY));
-    return Reach(size, xx > yy ? footprint.xy : footprint.zw, taps, 0.5 * log2(max(major / (taps * taps), 1.0)));
+    return Reach(size, xx > yy ? footprint.xy : footprint.zw, taps, max(0.5 * log2(max(major / (taps * taps), 1.0)) + LOD_BIAS, 0.0));
 }
 
 // Where look-up i is taken.
@@ -174,16 +180,21 @@ struct Found {
     uint count;
     float sharpest;  // concentration of those that matter
     vec3 mean;       // of their directions, stored as x, y, 1 - z
+    uint lobes;      // LOBES_* of moments.glsl
+    float area;      // mean cosine of the lobes below, about the normals that they have there
 };
 const float MATTERS = 0.02;
 
-void keep(ivec2 p, inout Found f, vec3 mu, float kappa, float weight) {
+// Each place below has its own normal, about which its lobes fill the projected area. A wider lobe has less of a mean cosine, and
+// so much less weight: the integral over directions stays what it is there.
+void keep(ivec2 p, inout Found f, vec3 mu, float kappa, float weight, vec3 normal) {
     if (weight <= LEAST_WEIGHT || f.count >= LOBES) {
         return;
     }
     kappa /= 1.0 + 0.5 * kappa * f.kernel;
     vec3 world = f.frame * moments_direction(mu);
-    imageStore(lobes, ivec3(p, int(f.count)), vec4(oct_encode(world), kappa, weight));
+    float share = weight * moments_area(kappa, f.lobes) / f.area;
+    imageStore(lobes, ivec3(p, int(f.count)), found_pack(world, f.frame * moments_direction(normal), kappa, share));
     f.count += 1u;
     f.sharpest = weight > MATTERS ? max(f.sharpest, kappa) : f.sharpest;
 }
@@ -197,16 +208,18 @@ void keep_slopes(ivec2 p, inout Found f, vec4 first, float product, float weight
     float most = 0.9999 * sqrt(variance.x * variance.y);
     float covariance = clamp(product - first.x * first.y, -most, most);
     float widened = 0.5 * f.kernel;
-    imageStore(lobes, ivec3(p, int(f.count)), vec4(first.xy, weight, 0.0));
-    imageStore(lobes, ivec3(p, int(f.count) + 1), vec4(variance.x + widened, covariance, variance.y + widened, 0.0));
+    imageStore(lobes, ivec3(p, int(f.count)), floatBitsToUint(vec4(first.xy, weight, 0.0)));
+    vec4 matrix = vec4(variance.x + widened, covariance, variance.y + widened, 0.0);
+    imageStore(lobes, ivec3(p, int(f.count) + 1), floatBitsToUint(matrix));
     f.count += 2u;
     f.sharpest = max(f.sharpest, 1.0 / min(variance.x, variance.y));
 }
 
-// Weight times characteristic vector, weight; weight times the spread of what is in it.
+// Weight times characteristic vector, weight; weight times the spread of what is in it; weight times the normals below.
 struct Cell {
     vec4 sum;
     float spread;
+    vec3 normal;
 };
 
 float cell_spread(Cell c) {
@@ -215,40 +228,47 @@ float cell_spread(Cell c) {
 
 void keep_cell(ivec2 p, inout Found f, Cell c, float share) {
     if (c.sum.w * share > LEAST_WEIGHT) {
-        keep(p, f, c.sum.xyz / c.sum.w, vmf_concentration(cell_spread(c)), c.sum.w * share);
+        float spread = cell_spread(c), kappa = LITERAL ? vmf_literal_concentration(spread) : vmf_concentration(spread);
+        keep(p, f, c.sum.xyz / c.sum.w, kappa, c.sum.w * share, c.normal / c.sum.w);
     }
 }
 
-// How much of a cell's one lobe stays beside those of its parts: by how far its spread goes beyond that of its lobes.
-float cell_kept(Cell c) {
+// How much of a cell's one lobe stays beside those of its parts: by the length of its mean vector, or by how far its spread goes
+// beyond that of its lobes.
+float cell_kept(Cell c, float length) {
+    if (length > 0.0) {
+        return 1.0 - cell_spread(c) >= length ? 1.0 : 0.0;
+    }
     float base = max(c.spread / max(c.sum.w, LEAST_WEIGHT), VMF_LEAST_SPREAD);
     float t = clamp((1.25 - cell_spread(c) / (1.5 * base)) * 2.0, 0.0, 1.0);
     return t * t * (3.0 - 2.0 * t);
 }
 
 Cell both(Cell a, Cell b) {
-    return Cell(a.sum + b.sum, a.spread + b.spread);
+    return Cell(a.sum + b.sum, a.spread + b.spread, a.normal + b.normal);
 }
 
 // The cells of what a pixel covers: between base texels, which have their lobes as they are, and the levels of cells. `turn` is
 // the cells' frame from the pixel's tangent frame, where these differ.
 void gather(MapRecord record, uint code, mat3 turn, vec2 uv, Reach r, uint lobe_layer, out Cell cells[CELLS]) {
     for (uint i = 0u; i < CELLS; ++i) {
-        cells[i] = Cell(vec4(0.0), 0.0);
+        cells[i] = Cell(vec4(0.0), 0.0, vec3(0.0));
     }
     float coarse = min(r.level, 1.0), level = max(r.level - 1.0, 0.0);
     for (float tap = 0.0; tap < r.taps; ++tap) {
         vec2 at = reach_tap(r, uv, tap);
+        float share = coarse / r.taps;
         for (uint i = 0u; i < filter_cells(FILTER); ++i) {
-            cells[i].sum += fetch(CELL_CLASSES, code, i, at, level) * (coarse / r.taps);
+            cells[i].sum += fetch(CELL_CLASSES, code, i, at, level) * share;
         }
-        if (FILTER == FILTER_VMF) {
-            vec4 low = fetch(CELL_CLASSES, code, CELLS, at, level) * (coarse / r.taps);
-            vec4 high = fetch(CELL_CLASSES, code, CELLS + 1u, at, level) * (coarse / r.taps);
-            for (uint i = 0u; i < 4u; ++i) {
-                cells[i].spread += low[i];
-                cells[i + 4u].spread += high[i];
+        for (uint i = 0u; i < filter_cells(FILTER); i += 4u) {
+            vec4 four = fetch(CELL_CLASSES, code, filter_cells(FILTER) + i / 4u, at, level) * share;
+            for (uint k = 0u; k < 4u; ++k) {
+                cells[i + k].spread += four[k];
             }
+        }
+        for (uint i = 0u; i < (record.upright != 0u ? 0u : filter_cells(FILTER)); ++i) {
+            cells[i].normal += fetch(CELL_CLASSES, code, filter_normals(FILTER) + i, at, level).xyz * share;
         }
     }
     if (CAMERA) {
@@ -261,22 +281,34 @@ void gather(MapRecord record, uint code, mat3 turn, vec2 uv, Reach r, uint lobe_
         for (uint i = 0u; i < CELLS; ++i) {
             cells[i].sum *= factor;
             cells[i].spread *= factor;
+            cells[i].normal *= factor;
         }
         coarse = factor > 0.0 ? coarse : 0.0;
     }
     for (float tap = 0.0; tap < r.taps; ++tap) {
         vec2 at = reach_tap(r, uv, tap);
         vec2 place = vec2(at.x, 1.0 - at.y) * r.size - 0.5, first = floor(place), part = place - first;
-        for (uint k = 0u; k < 4u; ++k) {
+        // Base texels, where they count.
+        for (uint k = 0u; k < (coarse < 1.0 ? 4u : 0u); ++k) {
             vec2 corner = vec2(k & 1u, k >> 1), share = mix(1.0 - part, part, corner);
             vec2 centre = (first + corner + 0.5) / r.size;
+            vec3 normal = vec3(0.0);
+            if (record.upright == 0u) {
+                normal = fetch(MOMENT_CLASSES, record.moments, 0u, vec2(centre.x, 1.0 - centre.y), 0.0).xyz;
+                normal = CAMERA ? moments_turned(turn, normal) : normal;
+            }
             for (uint j = 0u; j < record.count; ++j) {
                 vec4 lobe = fetch(MOMENT_CLASSES, record.moments, lobe_layer + j, vec2(centre.x, 1.0 - centre.y), 0.0);
                 float weight = record.weights[j] * share.x * share.y * ((1.0 - coarse) / r.taps);
                 lobe.xyz = CAMERA ? moments_turned(turn, lobe.xyz) : lobe.xyz;
                 uint cell = moments_cell(filter_cells(FILTER), vec3(lobe.xy, 1.0 - lobe.z));
-                cells[cell].sum += vec4(lobe.xyz, 1.0) * weight;
-                cells[cell].spread += lobe.w * weight;
+                // Selected, not indexed: lanes would go to memory for a place of their own.
+                for (uint i = 0u; i < CELLS; ++i) {
+                    float mine = i == cell ? weight : 0.0;
+                    cells[i].sum += vec4(lobe.xyz, 1.0) * mine;
+                    cells[i].spread += lobe.w * mine;
+                    cells[i].normal += normal * mine;
+                }
             }
         }
     }
@@ -286,28 +318,32 @@ void gather(MapRecord record, uint code, mat3 turn, vec2 uv, Reach r, uint lobe_
 void decode(ivec2 p, MapRecord record, vec2 uv, vec4 footprint, inout Found f) {
     Reach r = reach_of(MOMENT_CLASSES, record.moments, footprint);
     uint layer = record.upright != 0u ? 0u : 1u;
-    mat3 tangent = f.frame;
     if (filter_of_cells(FILTER)) {
         uint code = record.cells;
         mat3 turn = mat3(1.0);
         if (CAMERA && code != 0u) {
             code = objects[gbuffer_object(p)];
-            f.frame = mat3(frame.world_from_view[0].xyz, frame.world_from_view[1].xyz, frame.world_from_view[2].xyz);
-            turn = transpose(f.frame) * tangent;
+            mat3 camera = mat3(frame.world_from_view[0].xyz, frame.world_from_view[1].xyz, frame.world_from_view[2].xyz);
+            turn = transpose(camera) * f.frame;
+            f.frame = camera;
         }
         Cell cells[CELLS];
         gather(record, code, turn, uv, r, layer, cells);
-        Cell all = Cell(vec4(0.0), 0.0);
+        Cell all = Cell(vec4(0.0), 0.0, vec3(0.0));
         for (uint i = 0u; i < filter_cells(FILTER); ++i) {
             all = both(all, cells[i]);
+            // A lobe about the normal is one of that direction.
+            cells[i].normal = record.upright != 0u ? cells[i].sum.xyz : cells[i].normal;
         }
-        f.mean = all.sum.xyz / all.sum.w;
+        all.normal = record.upright != 0u ? all.sum.xyz : all.normal;
+        f.mean = all.normal / all.sum.w;
+        f.area = record.facing * moments_area(vmf_concentration(all.spread / max(all.sum.w, LEAST_WEIGHT)), record.lobes);
         if (FILTER == FILTER_VMF) {
-            float one = cell_kept(all);
+            float one = cell_kept(all, LENGTH_OF_ONE);
             keep_cell(p, f, all, one);
             for (uint i = 0u; i < 4u; ++i) {
                 Cell quarter = both(cells[2u * i], cells[2u * i + 1u]);
-                float kept = cell_kept(quarter);
+                float kept = cell_kept(quarter, LENGTH_OF_QUARTERS);
                 keep_cell(p, f, quarter, (1.0 - one) * kept);
                 keep_cell(p, f, cells[2u * i], (1.0 - one) * (1.0 - kept));
                 keep_cell(p, f, cells[2u * i + 1u], (1.0 - one) * (1.0 - kept));
@@ -319,6 +355,7 @@ void decode(ivec2 p, MapRecord record, vec2 uv, vec4 footprint, inout Found f) {
         }
     } else {
         uint count = filter_merges(FILTER) ? min(record.count, 1u) : record.count;
+        vec3 normal = record.upright != 0u ? vec3(0.0) : look_up(MOMENT_CLASSES, record.moments, 0u, uv, r).xyz;
         float constant = 0.0;
         for (uint i = 0u; FILTER == FILTER_FIXED && i < count; ++i) {
             // The map's mean: its last level.
@@ -333,12 +370,14 @@ void decode(ivec2 p, MapRecord record, vec2 uv, vec4 footprint, inout Found f) {
             }
             vec4 moments = look_up(MOMENT_CLASSES, record.moments, layer + i, uv, r);
             moments.w = FILTER == FILTER_FIXED ? constant : moments.w;
-            f.mean = i == 0u ? moments.xyz : f.mean;
-            keep(p, f, moments.xyz, moments_concentration(FILTER, moments), weight);
+            float base = FILTER == FILTER_VMF1 ? vmf_concentration(moments.w) : moments.w;
+            f.area = record.facing * moments_area(base, record.lobes);
+            normal = record.upright != 0u ? moments.xyz : normal;
+            f.mean = i == 0u ? normal : f.mean;
+            keep(p, f, moments.xyz, moments_concentration(FILTER, moments, LITERAL), weight, normal);
         }
     }
-    if (record.upright == 0u) {
-        f.frame = tangent;
+    if (record.count == 0u) {
         f.mean = look_up(MOMENT_CLASSES, record.moments, 0u, uv, r).xyz;
     }
 }
@@ -373,7 +412,7 @@ void main() {
         n = record.places.z != 0u && t.w != 0.0 ? bent : n;
     }
     if (LOBES != 0u) {
-        Found found = Found(tangent_frame(n, t), f.kernel, 0u, 0.0, vec3(0.0));
+        Found found = Found(tangent_frame(n, t), f.kernel, 0u, 0.0, vec3(0.0), record.lobes, 1.0);
         if (record.moments != 0u) {
             decode(p, record, uv, footprint, found);
         } else if (filter_of_slopes(FILTER)) {
@@ -381,10 +420,11 @@ void main() {
                 keep_slopes(p, found, vec4(0.0, 0.0, vec2(1.0 / max(record.concentration, LEAST_SLOPE_CONCENTRATION))), 0.0, 1.0);
             }
         } else if (record.count > 0u) {
-            keep(p, found, vec3(0.0), record.concentration, 1.0);
+            found.area = moments_area(record.concentration, record.lobes);
+            keep(p, found, vec3(0.0), record.concentration, 1.0, vec3(0.0));
         }
         if (found.count < LOBES) {
-            imageStore(lobes, ivec3(p, int(found.count)), vec4(0.0));
+            imageStore(lobes, ivec3(p, int(found.count)), uvec4(0u));
         }
         // What predicts bandwidth knows of one lobe only.
         f.alpha = found.count > 0u ? clamp(moments_alpha(found.sharpest, record.lobes), LEAST_ALPHA, record.rule.y) : f.alpha;

@@ -18,9 +18,10 @@ layout(push_constant) uniform Push {
     vec4 weights;
     vec4 view_from_world[3]; // columns
     uint count;
-    int lobe_layer; // the first lobe's
+    int lobe_layer; // the first lobe's; the mean normal is before it, if lobes are not about the normal
     int cell_layer;
     int frame_layer;
+    uint upright;
 };
 
 void main() {
@@ -30,9 +31,11 @@ void main() {
     }
     vec4 sums[CELLS];
     float spreads[CELLS];
+    vec4 normals[CELLS];
     for (uint i = 0u; i < CELLS; ++i) {
         sums[i] = vec4(0.0);
         spreads[i] = 0.0;
+        normals[i] = vec4(0.0);
     }
     Cover columns = cover(p.x, from.x, size.x), rows = cover(p.y, from.y, size.y);
     for (int y = rows.first; y <= rows.last; ++y) {
@@ -47,21 +50,32 @@ void main() {
                 mat3 view = mat3(view_from_world[0].xyz, view_from_world[1].xyz, view_from_world[2].xyz);
                 turn = view * tangent_frame(at.xyz, tangent_decode(at.xyz, at.w));
             }
+            vec4 normal = upright != 0u ? vec4(0.0) : imageLoad(lobes, ivec3(x, y, lobe_layer - 1));
+            normal.xyz = CAMERA ? moments_turned(turn, normal.xyz) : normal.xyz;
             for (uint i = 0u; i < count; ++i) {
                 vec4 lobe = imageLoad(lobes, ivec3(x, y, lobe_layer + int(i)));
                 lobe.xyz = CAMERA ? moments_turned(turn, lobe.xyz) : lobe.xyz;
                 float weight = share * weights[i];
                 uint cell = moments_cell(filter_cells(FILTER), vec3(lobe.xy, 1.0 - lobe.z));
-                sums[cell] += vec4(lobe.xyz, 1.0) * weight;
-                spreads[cell] += lobe.w * weight;
+                // Selected, not indexed: lanes would go to memory for a place of their own.
+                for (uint k = 0u; k < CELLS; ++k) {
+                    float mine = k == cell ? weight : 0.0;
+                    sums[k] += vec4(lobe.xyz, 1.0) * mine;
+                    spreads[k] += lobe.w * mine;
+                    normals[k] += vec4(normal.xyz, 1.0) * mine;
+                }
             }
         }
     }
-    for (uint i = 0u; i < filter_cells(FILTER); ++i) {
-        imageStore(cells, ivec3(p, cell_layer + int(i)), sums[i]);
+    int cell_count = int(filter_cells(FILTER));
+    for (int i = 0; i < cell_count; ++i) {
+        imageStore(cells, ivec3(p, cell_layer + i), sums[i]);
+        if (upright == 0u) {
+            imageStore(cells, ivec3(p, cell_layer + int(filter_normals(FILTER)) + i), normals[i]);
+        }
     }
-    if (FILTER == FILTER_VMF) {
-        imageStore(cells, ivec3(p, cell_layer + int(CELLS)), vec4(spreads[0], spreads[1], spreads[2], spreads[3]));
-        imageStore(cells, ivec3(p, cell_layer + int(CELLS) + 1), vec4(spreads[4], spreads[5], spreads[6], spreads[7]));
+    for (int i = 0; i < cell_count; i += 4) {
+        vec4 four = vec4(spreads[i], spreads[i + 1], spreads[i + 2], spreads[i + 3]);
+        imageStore(cells, ivec3(p, cell_layer + cell_count + i / 4), four);
     }
 }

@@ -177,6 +177,24 @@ impl Bins {
     }
 }
 
+/// When [`Filter::Vmf`] divides a cell.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum Division {
+    /// By how far its spread goes beyond that of the lobes in it, with a blend from one to the other.
+    #[default]
+    SpreadRatio,
+    /// Where the mean vector of all, and then of a quarter, is shorter than this (epsilon 0 and 1 of Xu et al. 2017, Algorithm 1).
+    Lengths([f64; 2]),
+}
+
+/// As printed.
+pub const PRINTED_LENGTHS: [f64; 2] = [0.95, 0.85];
+
+impl Division {
+    /// By [`PRINTED_LENGTHS`].
+    pub const PRINTED: Self = Self::Lengths(PRINTED_LENGTHS);
+}
+
 /// Lobes of a material that filters take apart.
 pub const MOST_BASE_LOBES: usize = 4;
 
@@ -228,6 +246,13 @@ pub struct Config {
     pub bins: Bins,
     /// Most look-ups along the longer axis of what a pixel covers of a map, 1 to 16.
     pub anisotropy: u32,
+    /// Added to the level at which maps are looked up, -16 to 16.
+    pub lod_bias: f32,
+    /// What divides a cell for [`Filter::Vmf`].
+    pub division: Division,
+    /// Whether the filters of Xu et al. 2017 have the paper's own relation of length and concentration (equations 8 and 9) and rule
+    /// for normals and lobes (13 and 14).
+    pub literal_lobes: bool,
     /// Whether the mesh's curvature widens lobes as [`Filter::Tk`] does, whatever the filter.
     pub geometric: bool,
     /// Directions a shaded sample, 1 to 65536; at least 2 for [`Estimator::Mis`]. Where [`Rate::Bandwidth`] chooses among several
@@ -263,6 +288,9 @@ impl Config {
             filter: Filter::default(),
             bins: Bins::default(),
             anisotropy: 1,
+            lod_bias: 0.0,
+            division: Division::default(),
+            literal_lobes: false,
             geometric: false,
             directions: 64,
             allocation: Allocation::default(),
@@ -275,6 +303,11 @@ impl Config {
     /// Whether the mesh's curvature widens lobes.
     pub(crate) fn widened(&self) -> bool {
         self.geometric || self.filter == Filter::Tk
+    }
+
+    /// Whether normals and lobes make one as the paper of the filter has it.
+    pub(crate) fn takes_lobes_literally(&self) -> bool {
+        self.literal_lobes && self.filter.stored().is_some_and(distribution::Filter::is_vmf)
     }
 
     /// Samples a side of the blocks that the prediction works on: 2x2 pixels.
@@ -347,6 +380,11 @@ impl Config {
             check(self.filter.has_cells(), "bins", expected, format!("camera with {}", self.filter.name()))?;
             let draws = matches!(self.gbuffer, GBufferSource::Draws);
             check(draws, "bins", "tangent, unless the G-buffer is made of draws", "camera with the host's G-buffer".into())?;
+        }
+        check(self.lod_bias.abs() <= 16.0, "lod_bias", "-16 to 16", self.lod_bias.to_string())?;
+        if let Division::Lengths(lengths) = self.division {
+            let inside = lengths.iter().all(|length| *length > 0.0 && *length < 1.0);
+            check(inside, "division", "two lengths above 0 and below 1", format!("{lengths:?}"))?;
         }
         check((1e-3..=0.1).contains(&self.eps), "eps", "0.001 to 0.1", self.eps.to_string())?;
         let rate = self.samples_per_cycle.unwrap_or(1.0);

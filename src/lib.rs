@@ -25,7 +25,7 @@ pub mod texture;
 mod view;
 
 pub use ash;
-pub use config::{Bins, Config, Estimator, Filter, GBufferSource, Rate};
+pub use config::{Bins, Config, Division, Estimator, Filter, GBufferSource, Rate};
 pub use error::{Error, Result};
 pub use frame::{EnvironmentUse, FrameInputs, GBufferInput, Output};
 pub use glam;
@@ -34,7 +34,7 @@ pub use gpu::{
     Missing, Requirements, Retired,
 };
 pub use light::Light;
-pub use material::{Maps, Material, PointMaterial, Roughness};
+pub use material::{Maps, Material, PointMaterial, Roughness, Sampling};
 pub use moments::Moments;
 pub use pass::gbuffer::Draw;
 pub use pass::tonemap::Transfer;

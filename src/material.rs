@@ -165,14 +165,13 @@ impl Material {
     }
 
     /// What the maps hold at `uv`, where a pixel has the extent `footprint`: the derivatives of `uv` by its x and y, before
-    /// tiling. Colours come through their mips, by at most `anisotropy` look-ups along the longer derivative; normals and
-    /// roughness from level 0.
-    pub fn at(&self, uv: DVec2, footprint: [DVec2; 2], anisotropy: u32) -> PointMaterial {
+    /// tiling. Colours come through their mips, as `sampling` says; normals and roughness from level 0.
+    pub fn at(&self, uv: DVec2, footprint: [DVec2; 2], sampling: Sampling) -> PointMaterial {
         let Maps { albedo, specular, normal, roughness, tiling } = &self.maps;
         let tiling = DVec2::from(tiling.map(f64::from));
         let place = uv * tiling;
         let colour = |map: &Arc<Texture>| {
-            let reach = Reach::of(footprint.map(|d| d * tiling), map.size(), anisotropy);
+            let reach = Reach::of(footprint.map(|d| d * tiling), map.size(), sampling);
             reach.places(place).map(|at| map.sample(at, reach.lod).truncate()).sum::<DVec3>() / f64::from(reach.taps)
         };
         let without = if matches!(self.model, Model::Vmf(_)) { DVec3::ZERO } else { DVec3::ONE };
@@ -187,14 +186,29 @@ impl Material {
     }
 
     /// The same under the filter that `moments` belong to: normals and roughness come from these, as colours do.
-    pub fn filtered_at(&self, moments: Option<&Moments>, uv: DVec2, footprint: [DVec2; 2], anisotropy: u32) -> PointMaterial {
-        let point = self.at(uv, footprint, anisotropy);
+    pub fn filtered_at(&self, moments: Option<&Moments>, uv: DVec2, footprint: [DVec2; 2], sampling: Sampling) -> PointMaterial {
+        let point = self.at(uv, footprint, sampling);
         let Some(moments) = moments else { return point };
         let tiling = DVec2::from(self.maps.tiling.map(f64::from));
-        let found = moments.at(uv * tiling, &Reach::of(footprint.map(|d| d * tiling), moments.size(), anisotropy));
+        let found = moments.at(uv * tiling, &Reach::of(footprint.map(|d| d * tiling), moments.size(), sampling));
         let normal = found.normal;
         let lobes = (found.lobes.count() > 0).then(|| Arc::new(found));
         PointMaterial { normal, lobes, ..point }
+    }
+}
+
+/// How maps are looked up.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sampling {
+    /// [`crate::Config::anisotropy`].
+    pub anisotropy: u32,
+    /// [`crate::Config::lod_bias`].
+    pub lod_bias: f64,
+}
+
+impl Default for Sampling {
+    fn default() -> Self {
+        Self { anisotropy: 1, lod_bias: 0.0 }
     }
 }
 
@@ -207,13 +221,17 @@ pub(crate) struct Reach {
 }
 
 impl Reach {
-    /// Of the derivatives `footprint` of a texture's coordinates, with at most `anisotropy` look-ups.
-    pub fn of(footprint: [DVec2; 2], size: [u32; 2], anisotropy: u32) -> Self {
+    /// Of the derivatives `footprint` of a texture's coordinates.
+    pub fn of(footprint: [DVec2; 2], size: [u32; 2], sampling: Sampling) -> Self {
         let size = DVec2::from(size.map(f64::from));
         let [x, y] = footprint.map(|d| (d * size).length());
         let (major, minor) = (x.max(y).max(1.0), x.min(y).max(1.0));
-        let taps = (major / minor - 1e-3).ceil().clamp(1.0, f64::from(anisotropy));
-        Self { axis: footprint[usize::from(y >= x)], taps: taps as u32, lod: (major / taps).max(1.0).log2() }
+        let taps = (major / minor - 1e-3).ceil().clamp(1.0, f64::from(sampling.anisotropy));
+        Self {
+            axis: footprint[usize::from(y >= x)],
+            taps: taps as u32,
+            lod: ((major / taps).max(1.0).log2() + sampling.lod_bias).max(0.0),
+        }
     }
 
     /// Where the look-ups are taken about `uv`.

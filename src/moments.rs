@@ -1,7 +1,8 @@
 //! What the filters that read through mips make of a material's normals and roughness, in f64: twin of the passes `brdf_map` and
 //! `vmf_mips` and of what `filter` decodes.
 
-use crate::config::{Filter, MOST_BASE_LOBES};
+use crate::config::{Division, Filter, MOST_BASE_LOBES};
+use crate::distribution::brdf_map::UPRIGHT;
 use crate::distribution::effective::{self, Rule};
 use crate::distribution::surface::FoundLobes;
 use crate::distribution::{BrdfMap, Filtered, Mixture};
@@ -19,12 +20,12 @@ pub(crate) struct BaseLobes {
 }
 
 impl BaseLobes {
-    /// `None` for tables, which have none of their own, and for more lobes than are taken apart.
-    pub fn of(model: &Model) -> Option<Self> {
+    /// By `rule`; `None` for tables, which have none of their own, and for more lobes than are taken apart.
+    pub fn of(model: &Model, rule: Rule) -> Option<Self> {
         let least = |ggx: &Ggx| Model::Ggx(Ggx { alpha: ggx.alpha.max(LEAST_ALPHA), ..*ggx });
         let lobes = match model {
-            Model::Ggx(ggx) => effective::base(&least(ggx), None, Rule::Exact)?,
-            other => effective::base(other, None, Rule::Exact)?,
+            Model::Ggx(ggx) => effective::base(&least(ggx), None, rule)?,
+            other => effective::base(other, None, rule)?,
         };
         let none = Lobe { mu: DVec3::Z, kappa: 0.0, weight: 0.0 };
         let mut all = [none; MOST_BASE_LOBES];
@@ -37,9 +38,14 @@ impl BaseLobes {
         self.all.get(..self.count).unwrap_or_default()
     }
 
-    /// Whether all are about the normal: each is a facet then.
+    /// The mean cosine of their directions to the normal.
+    pub fn facing(&self) -> f64 {
+        self.lobes().iter().map(|lobe| lobe.weight * lobe.mu.z).sum()
+    }
+
+    /// Whether all are about the normal.
     pub fn upright(&self) -> bool {
-        self.lobes().iter().all(|lobe| lobe.mu.z > 1.0 - 1e-6)
+        self.lobes().iter().all(|lobe| lobe.mu.z > UPRIGHT)
     }
 }
 
@@ -59,13 +65,15 @@ pub(crate) enum Parameter {
     Alpha,
     /// A cosine power, whose mean cosine is exact, of alpha sqrt(2 spread).
     Exponent,
+    /// GGX of that alpha, which has a mean cosine of its own.
+    Ggx,
 }
 
 impl Base {
     /// Of a material that has something to filter.
-    pub fn of(material: &Material) -> Option<Self> {
+    pub fn of(material: &Material, rule: Rule) -> Option<Self> {
         let maps = &material.maps;
-        let base = BaseLobes::of(&material.model).map_or(Self::Normals, Self::Lobes);
+        let base = BaseLobes::of(&material.model, rule).map_or(Self::Normals, Self::Lobes);
         (maps.normal.is_some() || base != Self::Normals && maps.roughness.is_some()).then_some(base)
     }
 
@@ -75,6 +83,11 @@ impl Base {
             Self::Lobes(base) => base.lobes(),
             Self::Normals => &[],
         }
+    }
+
+    /// [`BaseLobes::facing`], 1 if they stay.
+    pub fn facing(&self) -> f64 {
+        if let Self::Lobes(base) = self { base.facing() } else { 1.0 }
     }
 
     /// Whether a mean normal is stored beside lobes that are not about it.
@@ -97,7 +110,11 @@ impl Base {
 impl Parameter {
     /// Of a model's lobes.
     pub fn of(model: &Model) -> Self {
-        if matches!(model, Model::BlinnPhong(_)) { Self::Exponent } else { Self::Alpha }
+        match model {
+            Model::BlinnPhong(_) => Self::Exponent,
+            Model::Ggx(_) => Self::Ggx,
+            Model::Table(_) | Model::Turned(_) | Model::Vmf(_) => Self::Alpha,
+        }
     }
 }
 
@@ -109,25 +126,30 @@ pub struct Moments {
     /// The mean normal, where lobes are not about it.
     normals: Option<Filtered<'static>>,
     size: [u32; 2],
+    facing: f64,
 }
 
 impl Moments {
     /// Those that `filter` reads of a valid material; `None` for filters that read no mips of normals, and for materials without
-    /// a map to filter.
-    pub fn of(material: &Material, filter: Filter) -> Option<Self> {
-        let (filter, base) = (filter.stored()?, Base::of(material)?);
+    /// a map to filter. `literal` is [`crate::Config::literal_lobes`].
+    pub fn of(material: &Material, filter: Filter, division: Division, literal: bool) -> Option<Self> {
+        let filter = filter.stored()?;
+        let literal = literal && filter.is_vmf();
+        let rule = if literal { Rule::Literal } else { Rule::Exact };
+        let base = Base::of(material, rule)?;
         let size = base.size(material);
-        let keep =
-            |material: &Material, filter| Some(Filtered::keeping(filter, BrdfMap::of(material, size, Rule::Exact).ok()?, false));
-        let lobes = if base == Base::Normals { None } else { Some(keep(material, filter)?) };
+        let keep = |material: &Material, filter, rule| {
+            Some(Filtered::keeping(filter, BrdfMap::of(material, size, rule).ok()?, literal).divided(division))
+        };
+        let lobes = if base == Base::Normals { None } else { Some(keep(material, filter, rule)?) };
         let normals = if base.upright() {
             None
         } else {
             let model = Model::Ggx(Ggx { alpha: LEAST_ALPHA, f0: DVec3::ONE, albedo: DVec3::ZERO });
             let maps = Maps { normal: material.maps.normal.clone(), ..Maps::default() };
-            Some(keep(&Material::new(model, maps), crate::distribution::Filter::Naive)?)
+            Some(keep(&Material::new(model, maps), crate::distribution::Filter::Naive, Rule::Exact)?)
         };
-        Some(Self { filter, lobes, normals, size })
+        Some(Self { filter, lobes, normals, size, facing: base.facing() })
     }
 
     /// What is stored of the lobes, with its mips; `None` if the material's stay as they are.
@@ -158,15 +180,25 @@ impl Moments {
         };
         let direction = |map: &Filtered<'_>, texel: &[f64]| map.mean_vector(texel).try_normalize().unwrap_or(DVec3::Z);
         let of_normals = || self.normals.as_ref().map(|map| direction(map, &mean(map)));
-        let (upright, masking) = (self.normals.is_none(), self.filter.masking());
+        let (masking, facing) = (self.filter.masking(), self.facing);
         let Some(map) = &self.lobes else {
-            return FoundLobes { normal: of_normals().unwrap_or(DVec3::Z), lobes: Mixture::Vmf(Vec::new()), upright, masking };
+            let normal = of_normals().unwrap_or(DVec3::Z);
+            let (normals, below) = (Vec::new(), Vec::new());
+            return FoundLobes { normal, lobes: Mixture::Vmf(Vec::new()), normals, below, facing, masking };
         };
         let texel = mean(map);
         let lobes = map.decode(&texel);
-        let own = || direction(map, &texel);
-        let normal = if matches!(lobes, Mixture::Slopes(_)) { DVec3::Z } else { of_normals().unwrap_or_else(own) };
-        FoundLobes { normal, lobes, upright, masking }
+        if let Mixture::Slopes(_) = &lobes {
+            return FoundLobes { normal: DVec3::Z, lobes, normals: Vec::new(), below: Vec::new(), facing, masking };
+        }
+        let by_cell = map.normals(&texel);
+        let normal = match (of_normals(), by_cell.is_empty()) {
+            (Some(normal), true) => normal,
+            _ => direction(map, &texel),
+        };
+        let normals = (0..lobes.count()).map(|i| by_cell.get(i).and_then(|n| n.try_normalize()).unwrap_or(normal)).collect();
+        let below = map.concentrations_below(&texel, lobes.count());
+        FoundLobes { normal, lobes, normals, below, facing, masking }
     }
 }
 
@@ -174,7 +206,7 @@ impl Moments {
 mod tests {
     use super::*;
     use crate::distribution::vmf;
-    use crate::material::Roughness;
+    use crate::material::{Roughness, Sampling};
     use crate::reflectance::{BlinnPhong, MerlTable, Vmf};
 
     fn tilted(x: f32) -> [f32; 3] {
@@ -187,8 +219,8 @@ mod tests {
     }
 
     fn found(material: &Material, filter: Filter, footprint: [DVec2; 2]) -> FoundLobes {
-        let moments = Moments::of(material, filter).unwrap();
-        moments.at(DVec2::new(0.25, 0.5), &Reach::of(footprint, moments.size(), 1))
+        let moments = Moments::of(material, filter, Division::default(), false).unwrap();
+        moments.at(DVec2::new(0.25, 0.5), &Reach::of(footprint, moments.size(), Sampling::default()))
     }
 
     #[test]
@@ -206,7 +238,7 @@ mod tests {
             let Mixture::Vmf(lobes) = &far.lobes else { panic!("{far:?}") };
             let length = (1.0 - spread) * (1.0f64 - 0.09).sqrt();
             assert!((vmf::mean_cosine(lobes[0].kappa) / length - 1.0).abs() < 2e-3 && far.normal.z > 0.999_999, "{far:?}");
-            assert!(far.upright && lobes.len() == 1 && (lobes[0].weight - 1.0).abs() < 1e-12);
+            assert!(far.normals == [far.normal] && lobes.len() == 1 && (lobes[0].weight - 1.0).abs() < 1e-12);
             // The two normals are in cells of their own.
             let apart = found(&material, Filter::Vmf4, [DVec2::X, DVec2::Y]);
             let Mixture::Vmf(lobes) = &apart.lobes else { panic!("{apart:?}") };
@@ -226,8 +258,8 @@ mod tests {
             assert!((far.normal.x - mean.x).abs() < 1e-3 && far.lobes.count() == 0, "{far:?}");
             let rough = Texture::scalar([1, 1], &[0.5]).unwrap();
             let rough = Maps { roughness: Some((Arc::new(rough), Roughness::Alpha)), ..Maps::default() };
-            assert!(Moments::of(&Material::new(model, rough), Filter::Vmf1).is_none());
-            assert!(Moments::of(&material, Filter::Tk).is_none());
+            assert!(Moments::of(&Material::new(model, rough), Filter::Vmf1, Division::default(), false).is_none());
+            assert!(Moments::of(&material, Filter::Tk, Division::default(), false).is_none());
         }
     }
 
@@ -240,7 +272,8 @@ mod tests {
             [(Filter::Vmf1, 1), (Filter::Toksvig, 1), (Filter::ToksvigLobe, 2), (Filter::Vmf4, 2), (Filter::Vmf, 2)]
         {
             let far = found(&material, filter, [DVec2::X, DVec2::Y]);
-            assert!(!far.upright && far.lobes.count() == count, "{far:?}");
+            assert!(far.normals.len() == count && far.lobes.count() == count, "{far:?}");
+            assert!(far.normals.iter().all(|n| (n.x - 0.2).abs() < 1e-3) && (far.facing - 0.5f64.sqrt()).abs() < 1e-12);
             assert!((far.normal.x - 0.2).abs() < 1e-3 && (far.lobes.weight() - 1.0).abs() < 1e-9, "{far:?}");
         }
     }

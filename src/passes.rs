@@ -66,7 +66,7 @@ impl Passes {
                 .transpose()?,
             prefilter: looked_up.then(|| prefilter::Prefilter::new(&mut p)).transpose()?,
             moments: match config.filter.stored() {
-                Some(_) => Some((brdf_map::BrdfMap::new(&mut p, config.filter)?, vmf_mips::VmfMips::new(&mut p, config)?)),
+                Some(_) => Some((brdf_map::BrdfMap::new(&mut p, config)?, vmf_mips::VmfMips::new(&mut p, config)?)),
                 None => None,
             },
             texture_space: (config.bins == Bins::Camera).then(|| texture_space::TextureSpace::new(&mut p)).transpose()?,

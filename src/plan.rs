@@ -140,7 +140,7 @@ impl Plan {
             lobes: {
                 let layers = config.filter.lobe_layers();
                 let extent = if layers > 0 { shading } else { [1, 1] };
-                ImageDesc { layers: Some(layers.max(1)), ..image("lobes", vk::Format::R32G32B32A32_SFLOAT, extent, storage) }
+                ImageDesc { layers: Some(layers.max(1)), ..image("lobes", vk::Format::R32G32B32A32_UINT, extent, storage) }
             },
             curvature: config.curvature.then(|| image("curvature", vk::Format::R16G16B16A16_SFLOAT, shading, storage)),
             level: (levels.top > 0 && config.rate != Rate::Given)

@@ -1,6 +1,7 @@
 //! What is recorded when something changes: the environment, the materials.
 
 use crate::config::{Bins, Estimator, Rate};
+use crate::distribution::effective::Rule;
 use crate::error::{Error, Result};
 use crate::gpu::memory::HostAllocator;
 use crate::gpu::pipeline::BridgeLayouts;
@@ -63,6 +64,7 @@ impl Renderer {
     ) -> Result<Retired> {
         let bridge = BridgeLayouts { gbuffer: layout(&self.passes.gbuffer, &self.config), materials: self.bridge.layout };
         let config = &self.config;
+        let rule = if config.takes_lobes_literally() { Rule::Literal } else { Rule::Exact };
         let (modules, slots, widened) = (&config.modules, config.frames_in_flight, config.widened());
         let (filter, bins) = (self.config.filter, self.config.bins);
         let (passes, samplers) = (self.passes.moments.as_ref(), &self.samplers);
@@ -71,7 +73,8 @@ impl Renderer {
             base::check_materials(materials)?;
         }
         let (mut upload, filter) = Build::run(&self.cx, memory, |build| {
-            let upload = MaterialsUpload::new(build, materials, &Reading { filter, bins, widened, passes, samplers }, eps)?;
+            let reading = Reading { filter, bins, rule, widened, passes, samplers };
+            let upload = MaterialsUpload::new(build, materials, &reading, eps)?;
             let mut p = PassContext { build, modules, bridge, slots };
             let filter = filter::Filter::new(&mut p, config, upload.uses())?;
             Ok((upload, filter))

@@ -136,23 +136,26 @@ fn cells_are_those_of_the_lobes_in_the_texels_frames() {
                 covered * 5 > frames[0][0].1.len() && covered * 2 < frames[0][0].1.len(),
                 "less than half a sphere: {covered}"
             );
-            // Vector, weight and weight times spread of each cell.
-            let mips = Mips::new(size, 5 * count, |i, out| {
+            // Vector, weight, weight times spread and times normal of each cell.
+            let normals = (moments.len() > weights.len()).then(|| &moments[0]);
+            assert_eq!(cells.len(), count + count / 4 + if normals.is_some() { count } else { 0 });
+            let mips = Mips::new(size, 8 * count, |i, out| {
                 out.fill(0.0);
                 let Some(frame) = frame(i) else { return };
                 for (lobe, weight) in lobes.iter().zip(&weights) {
                     let stored = lobe[0].1[i];
                     let turned = view * (frame * vector(stored, 1.0));
-                    let own = [turned.x, turned.y, turned.z, 1.0, stored[3].into()];
+                    let normal = normals.map_or(DVec3::ZERO, |normals| view * (frame * vector(normals[0].1[i], 1.0)));
+                    let own = [turned.x, turned.y, turned.z, 1.0, stored[3].into(), normal.x, normal.y, normal.z];
                     let cell = partition.of(turned);
-                    out[5 * cell..].iter_mut().zip(own).for_each(|(sum, c)| *sum += weight * c);
+                    out[8 * cell..].iter_mut().zip(own).for_each(|(sum, c)| *sum += weight * c);
                 }
             });
             let (mut worst, mut elsewhere, mut all) = ([0.0f64; 2], 0, 0);
             for level in 1..mips.levels() {
                 assert_eq!(cells[0][level - 1].0, mips.size(level));
                 for i in 0..cells[0][level - 1].1.len() {
-                    let expected = mips.texel(level, i).unwrap().as_chunks::<5>().0;
+                    let expected = mips.texel(level, i).unwrap().as_chunks::<8>().0;
                     let (sum, weight) = whole(&cells[..count], level - 1, i);
                     let sums = expected.iter().fold([0.0; 4], |s, e| [s[0] + e[0], s[1] + e[1], s[2] + e[2], s[3] + e[3]]);
                     let off = (sum - DVec3::from_slice(&sums)).length().max((weight - sums[3]).abs());
@@ -160,9 +163,11 @@ fn cells_are_those_of_the_lobes_in_the_texels_frames() {
                     for (k, e) in expected.iter().enumerate() {
                         let stored = cells[k][level - 1].1[i];
                         let mut off = (vector(stored, stored[3].into()) - DVec3::from_slice(e)).length();
-                        if filter == Filter::Vmf {
-                            let spread = f64::from(cells[count + k / 4][level - 1].1[i][k % 4]);
-                            off = off.max((spread - e[4]).abs());
+                        let spread = f64::from(cells[count + k / 4][level - 1].1[i][k % 4]);
+                        off = off.max((spread - e[4]).abs());
+                        if let Some(normals) = cells.get(count + count / 4 + k) {
+                            let normal = vector(normals[level - 1].1[i], stored[3].into());
+                            off = off.max((normal - DVec3::from_slice(&e[5..])).length());
                         }
                         all += 1;
                         // A lobe on a border is in one cell here and in the other there.

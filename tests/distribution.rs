@@ -163,7 +163,7 @@ fn every_level_of_any_size_keeps_weights_and_short_vectors() {
                     let weight = filtered.mixture(level, i).weight();
                     assert!((weight - 1.0).abs() < 1e-3, "{name} {} {level} {i}: {weight}", filter.name());
                     let Some(cells) = filtered.cells_of(Cells::One, 0) else { continue };
-                    for cell in filtered.texel(level, i).unwrap()[cells].as_chunks::<5>().0 {
+                    for cell in filtered.texel(level, i).unwrap()[cells].as_chunks::<8>().0 {
                         // w r is shorter than w, and no longer than the mean of its parts.
                         let length = DVec3::new(cell[0], cell[1], cell[2]).length();
                         assert!(length < cell[3] || cell[3] == 0.0, "{name} {level} {i}: {cell:?}");
@@ -190,9 +190,9 @@ fn coarser_partitions_are_sums_of_finer() {
                     let parts = &eight.texel(level, i).unwrap()[eight.cells_of(cells, cell).unwrap()];
                     let whole = &coarse.texel(level, i).unwrap()[coarse.cells_of(cells, cell).unwrap()];
                     for (c, expected) in whole.iter().enumerate() {
-                        let sum: f64 = parts.chunks(5).map(|part| part[c]).sum();
+                        let sum: f64 = parts.chunks(8).map(|part| part[c]).sum();
                         worst = worst.max((sum - expected).abs());
-                        compared += usize::from(parts.chunks(5).filter(|p| p[3] > 0.0).count() > 1);
+                        compared += usize::from(parts.chunks(8).filter(|p| p[3] > 0.0).count() > 1);
                     }
                 }
             }

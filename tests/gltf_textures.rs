@@ -4,11 +4,11 @@
 use base64::Engine;
 use glam::{DVec2, DVec3, dvec2};
 use image::RgbImage;
-use passband::Material;
 use passband::offline::error::Error;
 use passband::offline::scene::Scene;
 use passband::offline::world::World;
 use passband::reflectance::{Ggx, Model};
+use passband::{Material, Sampling};
 use serde_json::json;
 
 fn data_uri(bytes: &[u8]) -> String {
@@ -54,7 +54,7 @@ fn shaded(world: &World, uv: DVec2) -> Ggx {
     let material = Material::new(m.model.clone(), m.maps.clone());
     material.validate().unwrap();
     let Model::Ggx(ggx) = material.model else { panic!("{:?}", material.model) };
-    let point = material.at(uv, [DVec2::ZERO; 2], 1);
+    let point = material.at(uv, [DVec2::ZERO; 2], Sampling::default());
     Ggx { alpha: point.roughness.unwrap_or(ggx.alpha), f0: ggx.f0 * point.specular, albedo: ggx.albedo * point.albedo }
 }
 

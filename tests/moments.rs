@@ -16,7 +16,7 @@ use passband::offline::session::{MomentLevels, Session};
 use passband::offline::texture::{Encoding, Image, Part};
 use passband::offline::world::World;
 use passband::reflectance::{BlinnPhong, Lobe, Model, Vmf};
-use passband::{Config, Estimator, Filter, Light, Maps, Requirements, Roughness, Texture};
+use passband::{Config, Division, Estimator, Filter, Light, Maps, Requirements, Roughness, Sampling, Texture};
 use std::f32::consts::TAU;
 use std::sync::Arc;
 use support::frames::{Stage, config, expected_with, furthest, ggx, ratio, table, tiles, world};
@@ -104,7 +104,7 @@ fn passes_store_what_the_twin_does() {
         for (number, material) in scene.materials.iter().enumerate() {
             let case = format!("{} {}", filter.name(), material.name);
             let stored = session.moments(number).unwrap();
-            let Some(twin) = Moments::of(&material.surface(), filter) else {
+            let Some(twin) = Moments::of(&material.surface(), filter, Division::default(), false) else {
                 assert!(stored.is_none() && material.maps.is_empty(), "{case}");
                 continue;
             };
@@ -121,6 +121,7 @@ fn passes_store_what_the_twin_does() {
                     note(DVec3::new(x, y, z) - DVec3::from_slice(&expected[..3]), 1.0, 1.0);
                 });
             }
+            let twin_normals = twin.normals().is_some();
             let Some(twin) = twin.lobes() else {
                 assert!(moments.next().is_none() && cells.is_empty(), "{case}");
                 continue;
@@ -141,21 +142,23 @@ fn passes_store_what_the_twin_does() {
                 }
                 Filter::Vmf4 | Filter::Vmf8 | Filter::Vmf => {
                     let count = if filter == Filter::Vmf4 { 4 } else { 8 };
-                    assert_eq!(cells.len(), if filter == Filter::Vmf { 10 } else { count }, "{case}");
+                    let normals = count + count / 4;
+                    assert_eq!(cells.len(), normals + if twin_normals { count } else { 0 }, "{case}");
                     for (k, layer) in cells.iter().enumerate() {
                         for (level, (size, texels)) in layer.iter().enumerate() {
                             assert_eq!(*size, twin.size(level + 1), "{case}");
                             for (i, texel) in texels.iter().enumerate() {
                                 let expected = twin.texel(level + 1, i).unwrap();
-                                if k < count {
-                                    let e = slots(5)(&expected, k);
-                                    let ([x, y], z, w) = vector(*texel, e[3]);
-                                    note(DVec3::new(x, y, z) - DVec3::from_slice(&e[..3]), 1.0, 1.0 + w - e[3]);
-                                } else {
-                                    let spread = |j: usize| slots(5)(&expected, 4 * (k - count) + j);
+                                let e = |cell: usize| slots(8)(&expected, cell);
+                                if (count..normals).contains(&k) {
+                                    let spread = |j: usize| e(4 * (k - count) + j);
                                     let off = (0..4).map(|j| f64::from(texel[j]) - (spread(j)[3] - spread(j)[4]));
                                     note(DVec3::X * off.map(f64::abs).fold(0.0, f64::max), 1.0, 1.0);
+                                    continue;
                                 }
+                                let (e, first) = if k < count { (e(k), 0) } else { (e(k - normals), 5) };
+                                let ([x, y], z, w) = vector(*texel, e[3]);
+                                note(DVec3::new(x, y, z) - DVec3::from_slice(&e[first..first + 3]), 1.0, 1.0 + w - e[3]);
                             }
                         }
                     }
@@ -163,7 +166,7 @@ fn passes_store_what_the_twin_does() {
                 _ => {
                     for (k, layer) in moments.enumerate() {
                         each(layer, twin, &mut |stored, expected| {
-                            let e = slots(5)(&expected, k);
+                            let e = slots(if filter == Filter::Vmf1 { 8 } else { 5 })(&expected, k);
                             let weight = if filter == Filter::Vmf1 { e[3] } else { e[4] };
                             let ([x, y], z, w) = vector(stored, 1.0);
                             let known = if filter == Filter::Vmf1 { 1.0 - e[4] } else { e[3] / weight };
@@ -217,20 +220,48 @@ fn frames_are_those_of_the_quadrature() {
         ("table", Filter::Vmf4, scene("sphere", table("metallic-paint"), tiled(normals([64; 2], 0.3), None))),
     ];
     for (name, filter, world) in cases {
-        let expected = expected_with(&world, [64, 64], Quadrature { filter, ..Quadrature::default() }, |interior| {
-            interior.into_iter().filter(|i| (i % 64 + i / 64) % 2 == 0).collect()
-        });
-        let config = Config { filter, ..config(expected.extent, Estimator::Mis, 4096) };
-        let image = Stage::new(&world, &config).frame([0, 0]);
-        let radiance = |i: usize| image.radiance(i);
-        let mean = ratio(&expected.pixels, radiance);
-        let tiles = tiles(&expected, 24, radiance);
-        let tile = furthest(tiles.iter().copied());
-        let name = format!("{name}, {}", filter.name());
-        println!("{name:20} mean {mean:.5}, worst of {} tiles {tile:.5}, {} pixels", tiles.len(), expected.pixels.len());
-        assert!(expected.error <= 1e-3 && expected.pixels.len() > 400 && tiles.len() >= 6);
-        assert!((mean - 1.0).abs() <= 0.003 && (tile - 1.0).abs() <= 0.01, "{name}: mean {mean:.5}, tile {tile:.5}");
+        agrees(name, &world, Quadrature { filter, ..Quadrature::default() });
     }
+}
+
+/// A frame with many directions against the quadrature, whose options it shares.
+fn agrees(name: &str, world: &World, options: Quadrature) {
+    let expected =
+        expected_with(world, [64, 64], options, |interior| interior.into_iter().filter(|i| (i % 64 + i / 64) % 2 == 0).collect());
+    let Quadrature { filter, sampling, division, literal_lobes, .. } = options;
+    let (anisotropy, lod_bias) = (sampling.anisotropy, sampling.lod_bias as f32);
+    let base = config(expected.extent, Estimator::Mis, 4096);
+    let config = Config { filter, anisotropy, lod_bias, division, literal_lobes, ..base };
+    let image = Stage::new(world, &config).frame([0, 0]);
+    let radiance = |i: usize| image.radiance(i);
+    let mean = ratio(&expected.pixels, radiance);
+    let tiles = tiles(&expected, 24, radiance);
+    let tile = furthest(tiles.iter().copied());
+    let name = format!("{name}, {}", filter.name());
+    println!("{name:24} mean {mean:.5}, worst of {} tiles {tile:.5}, {} pixels", tiles.len(), expected.pixels.len());
+    assert!(expected.error <= 1e-3 && expected.pixels.len() > 400 && tiles.len() >= 6);
+    assert!((mean - 1.0).abs() <= 0.003 && (tile - 1.0).abs() <= 0.01, "{name}: mean {mean:.5}, tile {tile:.5}");
+}
+
+#[test]
+fn other_ways_to_read_maps_are_those_of_the_quadrature() {
+    let maps = |tiling| Maps {
+        normal: normals([67, 45], 0.3),
+        roughness: roughness([67, 45], Roughness::Alpha, 0.1, 0.4),
+        tiling,
+        ..Maps::default()
+    };
+    let metal = || ggx(0.15, DVec3::splat(0.9), DVec3::splat(0.3));
+    let stretched = scene("sphere", metal(), maps([12.0, 2.0]));
+    let plain = Quadrature { filter: Filter::Vmf, ..Quadrature::default() };
+    let along = Sampling { anisotropy: 8, lod_bias: 0.0 };
+    agrees("look-ups along", &stretched, Quadrature { sampling: along, ..plain });
+    let sharper = Sampling { anisotropy: 2, lod_bias: -0.7 };
+    agrees("sharper", &stretched, Quadrature { filter: Filter::Lean, sampling: sharper, ..plain });
+    let even = scene("sphere", lobes(&[(0.0, 60.0)]), maps([3.0, 2.0]));
+    agrees("as printed", &even, Quadrature { division: Division::PRINTED, literal_lobes: true, ..plain });
+    agrees("as printed", &even, Quadrature { filter: Filter::Vmf1, literal_lobes: true, ..plain });
+    agrees("by length", &even, Quadrature { division: Division::Lengths([0.99, 0.97]), ..plain });
 }
 
 #[test]

@@ -3,7 +3,7 @@
 use glam::{DVec2, DVec3, dvec2};
 use passband::reflectance::{BlinnPhong, Ggx, Lobe, Model, Reflectance, Vmf, stand_in};
 use passband::texture::{Classes, Format, MAX_SIDE, decode_srgb, encode_srgb};
-use passband::{Error, Maps, Material, Roughness, Texture};
+use passband::{Error, Maps, Material, Roughness, Sampling, Texture};
 use std::sync::Arc;
 
 /// A repeatable number in [0, 1).
@@ -171,7 +171,7 @@ fn materials_without_maps_are_their_models() {
     for model in [ggx(), blinn_phong(), vmf(), table()] {
         let material = Material::from(model.clone());
         material.validate().unwrap();
-        let point = material.at(dvec2(0.3, 0.4), [DVec2::X, DVec2::Y], 1);
+        let point = material.at(dvec2(0.3, 0.4), [DVec2::X, DVec2::Y], Sampling::default());
         assert_eq!((point.normal, point.specular, point.roughness), (DVec3::Z, DVec3::ONE, None));
         let reflectance = point.reflectance(&model);
         for [wi, wo] in (0..50).map(directions) {
@@ -195,7 +195,7 @@ fn maps_do_to_each_model_what_they_say() {
     let at = |model: Model, maps: Maps| {
         let material = Material::new(model, maps);
         material.validate().unwrap();
-        material.at(DVec2::ZERO, [DVec2::ZERO; 2], 1).reflectance(&material.model)
+        material.at(DVec2::ZERO, [DVec2::ZERO; 2], Sampling::default()).reflectance(&material.model)
     };
     // alpha 0.125 is a concentration of 128.
     for map in [(scalar(0.125), Roughness::Alpha), (scalar(128.0), Roughness::Kappa)] {
@@ -221,7 +221,7 @@ fn roughness_is_clamped_to_what_models_accept() {
     let roughness = |model: Model, value: f32, kind| {
         let maps = Maps { roughness: Some((scalar(value), kind)), ..Maps::default() };
         let material = Material::new(model, maps);
-        let point = material.at(DVec2::ZERO, [DVec2::ZERO; 2], 1);
+        let point = material.at(DVec2::ZERO, [DVec2::ZERO; 2], Sampling::default());
         let reflectance = point.reflectance(&material.model);
         let [wi, wo] = directions(1);
         assert!(reflectance.evaluate(wi, wo).is_finite());
@@ -266,17 +266,17 @@ fn normals_and_roughness_come_from_level_0_and_colours_through_mips() {
     material.validate().unwrap();
     // The centre of texel (0, 0) under a tiling of 2 is at u = 1/16.
     let uv = dvec2(1.0 / 16.0, 7.0 / 8.0);
-    let near = material.at(uv, [DVec2::ZERO; 2], 1);
+    let near = material.at(uv, [DVec2::ZERO; 2], Sampling::default());
     assert_eq!(near.albedo, DVec3::ZERO);
     assert!((near.normal - DVec3::new(0.6, 0.0, 0.8)).length() < 1e-3 && (near.roughness.unwrap() - 0.25).abs() < 1e-6);
     // Two texels along x: one level up, where all is grey; a step of y as long changes nothing.
-    let far = material.at(uv, [dvec2(0.25, 0.0), dvec2(0.0, 0.1)], 1);
+    let far = material.at(uv, [dvec2(0.25, 0.0), dvec2(0.0, 0.1)], Sampling::default());
     assert_eq!((far.albedo, far.normal, far.roughness), (DVec3::splat(0.5), near.normal, near.roughness));
     // Half a level: the longer derivative counts.
-    let between = material.at(uv, [dvec2(0.0, 0.25 * std::f64::consts::SQRT_2), DVec2::ZERO], 1);
+    let between = material.at(uv, [dvec2(0.0, 0.25 * std::f64::consts::SQRT_2), DVec2::ZERO], Sampling::default());
     assert!((between.albedo.x - 0.25).abs() < 1e-9, "{}", between.albedo);
     // Between opposite normals there is the one that stands upright.
-    let middle = material.at(dvec2(1.0 / 8.0, 7.0 / 8.0), [DVec2::ZERO; 2], 1);
+    let middle = material.at(dvec2(1.0 / 8.0, 7.0 / 8.0), [DVec2::ZERO; 2], Sampling::default());
     assert!((middle.normal - DVec3::Z).length() < 1e-6 && (middle.roughness.unwrap() - 0.5).abs() < 1e-6);
 }
 

@@ -1,10 +1,10 @@
-// Reflection by the lobes that the filter found at a sample (src/distribution/surface.rs is the f64 twin). A lobe of a material whose
-// lobes are about its normal is a facet: a surface of its own, with the lobe's direction as its normal. Lobes about other directions
-// are one distribution of normals about the mean normal, Gaussians of slopes one about the surface's own. Include after
-// materials.glsl and local.glsl; the includer defines LOBES_BINDING.
+// Reflection by the lobes that the filter found at a sample (src/distribution/surface.rs is the f64 twin). Each is a facet: a surface
+// of its own, with the normal of what is below it, which is the lobe's direction for materials whose lobes are about the normal.
+// Gaussians of slopes are one distribution about the surface's own normal. Include after materials.glsl and local.glsl; the includer
+// defines LOBES_BINDING.
 #ifndef LOBES_GLSL
 #define LOBES_GLSL
-#include "oct.glsl"
+#include "found.glsl"
 #include "sobol.glsl"
 
 // Layers of `lobes_found`, of which one is bound in any case, and whether they hold lobes.
@@ -14,21 +14,21 @@ layout(constant_id = 7) const uint LOBED = 0u;
 layout(constant_id = 8) const uint SLOPES = 0u;
 layout(constant_id = 9) const uint SMITH = 0u;
 
-// Directions, which is two layers of slopes: oct.glsl's two numbers, concentration, weight; 0 after the last.
-// Slopes: mean, weight; covariance xx, xy, yy.
-layout(set = 2, binding = LOBES_BINDING) uniform sampler2DArray lobes_found;
+// As found.glsl packs them, all 0 after the last. Slopes, two layers each: mean, weight; covariance xx, xy, yy.
+layout(set = 2, binding = LOBES_BINDING) uniform usampler2DArray lobes_found;
 
-// Directions: local mean direction; cosine to the viewer, of facets at least FACING.
+// Directions: local mean direction; cosine of the normal to the viewer, at least FACING.
 // Slopes, two entries each, in the tangent frame: mean, the density's height, weight.
 vec4 lobe_axis[LAYERS];
 // Directions: alpha squared (GGX), exponent (cosine powers) or concentration; D at the centre; weight; density there of what is drawn.
 // Slopes: inverse of the covariance; the covariance.
 vec4 lobe_shape[LAYERS];
+// Directions: local normal.
+vec3 lobe_normal[LAYERS];
 
 // The sample's lobes, with those.
 struct Lobes {
     uint count;
-    bool facets;
     float diffuse; // share of directions that are drawn by the cosine
 };
 
@@ -36,38 +36,33 @@ float mean_of(vec3 c) {
     return dot(c, vec3(1.0 / 3.0));
 }
 
-// Whether all of a material's own lobes are about its normal, and the sum of their weights.
-bool lobes_upright(Material m, out float total) {
+// The sum of the weights of a material's own lobes.
+float lobes_total(Material m) {
     bool vmf = m.record.kind.x == REFLECTANCE_VMF;
-    bool upright = true;
-    total = vmf ? 0.0 : 1.0;
+    float total = vmf ? 0.0 : 1.0;
     for (uint i = 0u; i < (vmf ? m.record.kind.z : 0u); ++i) {
-        MaterialRecord lobe = materials[m.record.kind.y + i];
-        total += lobe.albedo.y;
-        upright = upright && lobe.f0.z > 1.0 - 1e-6;
+        total += materials[m.record.kind.y + i].albedo.y;
     }
-    return upright;
+    return total;
 }
 
 Lobes lobes_load(ivec2 p, Local f, Material m) {
     Lobes l;
     l.count = 0u;
-    l.facets = true;
     l.diffuse = 0.0;
     if (LOBED == 0u) {
         return l;
     }
-    float total;
-    l.facets = lobes_upright(m, total);
+    float total = lobes_total(m);
     uint kind = m.record.kind.x;
     bool ggx = kind == REFLECTANCE_GGX, cosine = kind == REFLECTANCE_BLINN_PHONG;
     if (SLOPES != 0u) {
         for (uint i = 0u; 2u * i + 1u < LAYERS; ++i) {
-            vec4 first = texelFetch(lobes_found, ivec3(p, int(2u * i)), 0);
+            vec4 first = uintBitsToFloat(texelFetch(lobes_found, ivec3(p, int(2u * i)), 0));
             if (first.z <= 0.0) {
                 break;
             }
-            vec4 second = texelFetch(lobes_found, ivec3(p, int(2u * i) + 1), 0);
+            vec4 second = uintBitsToFloat(texelFetch(lobes_found, ivec3(p, int(2u * i) + 1), 0));
             float determinant = second.x * second.z - second.y * second.y;
             lobe_axis[2u * i] = vec4(first.xy, 0.5 * INV_PI * inversesqrt(determinant), first.z * total);
             lobe_shape[2u * i] = vec4(vec3(second.z, -second.y, second.x) / determinant, 0.0);
@@ -75,26 +70,19 @@ Lobes lobes_load(ivec2 p, Local f, Material m) {
             l.count += 1u;
         }
     } else {
-        float area = 0.0;
         for (uint i = 0u; i < LAYERS; ++i) {
-            vec4 found = texelFetch(lobes_found, ivec3(p, int(i)), 0);
-            if (found.w <= 0.0) {
+            uvec4 found = texelFetch(lobes_found, ivec3(p, int(i)), 0);
+            if (found_none(found)) {
                 break;
             }
-            vec3 world = oct_decode(found.xy);
-            vec3 mu = vec3(dot(world, f.x), dot(world, f.y), dot(world, f.z));
-            float kappa = found.z, spread = vmf_spread(kappa), height = vmf_normalisation(kappa);
+            vec3 mu = found_direction(found) * mat3(f.x, f.y, f.z), normal = found_normal(found) * mat3(f.x, f.y, f.z);
+            float kappa = found_concentration(found), spread = vmf_spread(kappa), height = vmf_normalisation(kappa);
             float a = ggx ? clamp(2.0 / kappa, 1e-6, 1.0) : (cosine ? max(1.0 / spread - 2.0, 0.0) : kappa);
-            float peak = ggx ? a * INV_PI : (cosine ? blinn_phong_peak(a) : height);
-            area += found.w * (1.0 - spread) * mu.z;
-            peak /= kind == REFLECTANCE_VMF && l.facets ? max(1.0 - spread, LEAST_PROJECTED_AREA) : 1.0;
-            lobe_axis[i] = vec4(mu, l.facets ? max(dot(mu, f.view), FACING) : f.view.z);
-            lobe_shape[i] = vec4(a, peak, found.w * total, height);
+            float peak = ggx ? a * INV_PI : (cosine ? blinn_phong_peak(a) : height / max(1.0 - spread, LEAST_PROJECTED_AREA));
+            lobe_axis[i] = vec4(mu, max(dot(normal, f.view), FACING));
+            lobe_shape[i] = vec4(a, peak, found_weight(found) * total, height);
+            lobe_normal[i] = normal;
             l.count += 1u;
-        }
-        float share = l.facets ? 1.0 : 1.0 / max(area, LEAST_PROJECTED_AREA);
-        for (uint i = 0u; i < l.count; ++i) {
-            lobe_shape[i].y *= share;
         }
     }
     float base = mean_of(m.record.albedo.rgb), gloss = mean_of(m.record.f0.rgb) * total;
@@ -165,8 +153,8 @@ vec4 lobes_evaluate(Material m, Lobes l, vec3 wi, vec3 wo, vec3 h) {
             vec4 axis = lobe_axis[i], shape = lobe_shape[i];
             vec3 d = h - axis.xyz;
             float square = dot(d, d), ch = 1.0 - 0.5 * square, sine = square * (1.0 - 0.25 * square);
-            float ci = l.facets ? dot(axis.xyz, wi) : wi.z;
-            float co = axis.w;
+            vec3 normal = lobe_normal[i];
+            float ci = dot(normal, wi), co = axis.w;
             bool lit = ci > 0.0;
             ci = lit ? ci : 1.0;
             float q = shape.x * ch * ch + sine;
@@ -174,7 +162,7 @@ vec4 lobes_evaluate(Material m, Lobes l, vec3 wi, vec3 wo, vec3 h) {
             float normals = shape.y * (ggx ? 1.0 / (q * q) : exp(exponent));
             normals = (ggx || cosine) && ch <= 0.0 ? 0.0 : normals;
             float open = ggx ? 1.0 / (ggx_masking(ci, shape.x) * ggx_masking(co, shape.x))
-                             : min(0.25 / (ci * co), 0.5 * max(l.facets ? ch : h.z, 0.0) / (across * max(ci, co)));
+                             : min(0.25 / (ci * co), 0.5 * max(dot(normal, h), 0.0) / (across * max(ci, co)));
             float lit_weight = lit ? shape.z * ci : 0.0;
             specular += normals * open * lit_weight;
             diffuse += lit_weight;

@@ -5,9 +5,10 @@
 //   lean, leadr; lean-lobe:              mean slope, mean products xx and yy; mean product xy. lean-lobe keeps lobes apart
 //   vmf1:                                characteristic vector of all lobes; their mean spread
 //   vmf4, vmf8, vmf:                     of a base texel each lobe as vmf1 has it; from level 1 on, in images of half the size,
-//                                        of each cell weight times characteristic vector (w x, w y, w - w z) and weight w, and
-//                                        for vmf weight times spread, four cells in a layer. With bins in camera space the
-//                                        cells are an object's own, in view space, of weight 0 where it shows nothing
+//                                        of each cell weight times characteristic vector (w x, w y, w - w z) and weight w; then
+//                                        weight times spread, four cells in a layer; then, if lobes are not about the normal,
+//                                        weight times the normal of each cell's texels (w x, w y, w - w z). With bins in camera space
+//                                        the cells are an object's own, in view space, of weight 0 where it shows nothing
 // Lobes kept apart have the weights that they have everywhere. In front, if lobes are not about the normal: the mean normal.
 #ifndef MOMENTS_GLSL
 #define MOMENTS_GLSL
@@ -30,6 +31,7 @@ const uint FILTER_VMF = 10u;
 const uint LOBES_STAY = 0u;     // nothing: the material's own lobes stay
 const uint LOBES_ALPHA = 1u;    // a lobe: alpha is sqrt(2 / concentration)
 const uint LOBES_EXPONENT = 2u; // a cosine power, whose mean cosine is exact: alpha is sqrt(2 spread)
+const uint LOBES_GGX = 3u;      // GGX of that alpha, which has another mean cosine
 
 const uint MOST_BASE_LOBES = 4u; // of a material, that are filtered
 const uint CELLS = 8u;
@@ -47,6 +49,11 @@ bool filter_of_cells(uint filtering) {
 
 uint filter_cells(uint filtering) {
     return filtering == FILTER_VMF4 ? 4u : CELLS;
+}
+
+// The layer of cells with the first normal.
+uint filter_normals(uint filtering) {
+    return filtering == FILTER_VMF4 ? 5u : CELLS + 2u;
 }
 
 // Whether lobes that are not of one direction are merged.
@@ -78,9 +85,10 @@ vec3 moments_turned(mat3 turn, vec3 r) {
 }
 
 // The concentration of the lobe that a filter with lobes of directions finds in moments.
-float moments_concentration(uint filtering, vec4 moments) {
+float moments_concentration(uint filtering, vec4 moments, bool literal) {
     if (filtering == FILTER_VMF1) {
-        return vmf_concentration(moments_spread(moments.xyz, moments.w));
+        float spread = moments_spread(moments.xyz, moments.w);
+        return literal ? vmf_literal_concentration(spread) : vmf_concentration(spread);
     }
     float kappa = moments.w;
     if (filtering == FILTER_TOKSVIG || filtering == FILTER_TOKSVIG_LOBE) {
@@ -93,6 +101,13 @@ float moments_concentration(uint filtering, vec4 moments) {
 // Alpha of a lobe of this concentration.
 float moments_alpha(float kappa, uint lobes) {
     return sqrt(lobes == LOBES_EXPONENT ? 2.0 * vmf_spread(kappa) : 2.0 / max(kappa, 1e-12));
+}
+
+// The mean cosine over solid angle of a material's lobe of this concentration (src/distribution/effective.rs has GGX's).
+float moments_area(float kappa, uint lobes) {
+    float square = clamp(2.0 / max(kappa, 1e-12), 1e-6, 1.0), c = sqrt(max(1.0 - square, 0.0));
+    float ratio = c < 1e-2 ? 1.0 + c * c * (1.0 / 3.0) : 0.5 * log((1.0 + c) * (1.0 + c) / square) / c; // artanh(c) / c
+    return lobes == LOBES_GGX ? 1.0 / (1.0 + square * ratio) : max(1.0 - vmf_spread(kappa), 0.05);
 }
 
 // The cell of a direction: the quadrant about z, and of eight cells its half nearer to z or to the horizon

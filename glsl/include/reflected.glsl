@@ -84,12 +84,14 @@ ReflectedLobe reflected_found(Material m, Lobes l, uint i, vec3 wo) {
     cosine_to = seen ? cosine_to : 1.0;
     vec3 wi = seen ? lobe.direction : wo;
     lobe.kappa = kappa / (4.0 * cosine_to);
-    bool facet = SLOPES == 0u && l.facets;
-    float ci = facet ? cosine_to : wi.z;
-    float open = facet ? 0.25 / (ci * ci) : cavity_masking(wi, wo, centre);
+    float ci = wi.z, open = cavity_masking(wi, wo, centre);
+    if (SLOPES == 0u) {
+        ci = max(dot(lobe_normal[i], wi), 0.0);
+        float lit = max(ci, FACING), co = lobe_axis[i].w;
+        open = min(0.25 / (lit * co), 0.5 * max(dot(lobe_normal[i], centre), 0.0) / (cosine_to * max(lit, co)));
+    }
     if (ggx && SLOPES == 0u) {
-        float masking = ggx_masking(ci, lobe_shape[i].x);
-        open = 1.0 / (masking * masking);
+        open = 1.0 / (ggx_masking(ci, lobe_shape[i].x) * ggx_masking(lobe_axis[i].w, lobe_shape[i].x));
     }
     vec3 f = m.record.f0.rgb;
     if (ggx) {

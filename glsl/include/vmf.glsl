@@ -37,6 +37,22 @@ float vmf_spread(float kappa) {
     return kappa < VMF_SERIES_BELOW ? 1.0 - vmf_mean_cosine_series(kappa) : 1.0 / kappa - 2.0 * e / (1.0 - e);
 }
 
+// Xu et al. 2017, equations 8 and 9: the first term of the concentration, and the spread that it inverts (src/distribution/literal.rs).
+float vmf_literal_concentration(float spread) {
+    float s = clamp(spread, VMF_LEAST_SPREAD, 1.0), r = 1.0 - s;
+    return r * (3.0 - r * r) / (s * (2.0 - s));
+}
+
+float vmf_literal_spread(float kappa) {
+    float e = 1.0 / (1.0 + kappa);
+    for (int i = 0; i < 8; ++i) {
+        float value = -2.0 + e * (2.0 * kappa + e * ((3.0 - kappa) - e));
+        float slope = 2.0 * kappa + e * (2.0 * (3.0 - kappa) - 3.0 * e);
+        e -= value / slope;
+    }
+    return e;
+}
+
 // The concentration of a lobe of this spread, which is clamped to at least VMF_LEAST_SPREAD and at most 1: Banerjee's estimate
 // (within 5 %) and two Newton steps, each of which squares the relative error.
 float vmf_concentration(float spread) {

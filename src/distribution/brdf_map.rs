@@ -8,12 +8,17 @@ use crate::material::Material;
 use crate::texture::{MAX_SIDE, Texture, for_each_cover};
 use glam::{DVec2, DVec3};
 
+/// Lobes whose direction has more than this for a cosine are about the normal.
+pub(crate) const UPRIGHT: f64 = 1.0 - 1e-6;
+
 /// Lobes of the texels of a map, the same number in each, of weights that sum to 1 in each.
 #[derive(Clone, Debug)]
 pub struct BrdfMap {
     size: [u32; 2],
     lobes_per_texel: usize,
     lobes: Vec<Lobe>,
+    /// Of each texel, if its lobes are about other directions.
+    normals: Vec<DVec3>,
 }
 
 impl BrdfMap {
@@ -46,7 +51,7 @@ impl BrdfMap {
                 return Err(Error::invalid(format!("brdf map.texel {i}"), "weights of sum 1", sum));
             }
         }
-        Ok(Self { size, lobes_per_texel, lobes })
+        Ok(Self { size, lobes_per_texel, lobes, normals: Vec::new() })
     }
 
     /// The map of a material: at each texel its base lobes under the normals and the roughness that its maps have there. Where
@@ -82,7 +87,9 @@ impl BrdfMap {
         }
         let of_texel = |i: usize| bases.get(i * plain.len()..(i + 1) * plain.len()).unwrap_or(&plain);
         let lobes = (0..count).flat_map(|i| effective::lobes(of_texel(i), normals[i], rule)).collect();
-        Ok(Self { size, lobes_per_texel: plain.len(), lobes })
+        let normals = if plain.iter().all(|l| l.mu.z > UPRIGHT) { Vec::new() } else { normals };
+        let normals = normals.into_iter().map(|n| n.try_normalize().unwrap_or(DVec3::Z)).collect();
+        Ok(Self { size, lobes_per_texel: plain.len(), lobes, normals })
     }
 
     /// Width and height in texels.
@@ -98,6 +105,11 @@ impl BrdfMap {
     /// All lobes, texel by texel, row by row.
     pub fn lobes(&self) -> &[Lobe] {
         &self.lobes
+    }
+
+    /// The mean normal of texel `i`, where its lobes are about other directions.
+    pub fn normal(&self, i: usize) -> Option<DVec3> {
+        self.normals.get(i).copied()
     }
 
     /// The lobes of texel `i`; none beyond the last.

@@ -1,5 +1,6 @@
 //! Filters of normal and BRDF maps: what each stores a texel, of which mips are averages, and the lobes that it decodes.
 
+use crate::config::Division;
 use crate::distribution::brdf_map::BrdfMap;
 use crate::distribution::literal;
 use crate::distribution::mip::Mips;
@@ -40,8 +41,8 @@ pub enum Filter {
     Vmf,
 }
 
-/// The lengths of the mean vector of one and of four cells below which Algorithm 1 takes more (epsilon 0 and 1).
-const PRINTED_LENGTHS: [f64; 2] = [0.95, 0.85];
+/// How often cells are divided.
+const DIVISIONS: usize = 2;
 
 /// How much greater than its lobes' own spread a cell's spread may be before it is divided.
 const SPREAD_RATIO: f64 = 1.5;
@@ -50,8 +51,9 @@ const SPREAD_RATIO: f64 = 1.5;
 const DIRECTION: usize = 5;
 /// For each lobe of slopes: weight times mean slope and mean products xx, xy, yy, and weight.
 const SLOPE: usize = 6;
-/// For each cell: weight times characteristic vector, weight, and weight times the mean length of the characteristic vectors.
-const CELL: usize = 5;
+/// For each cell: weight times characteristic vector, weight, weight times the mean length of the characteristic vectors, and weight
+/// times the normals below: those of lobes about them are their characteristic vectors.
+const CELL: usize = 8;
 
 impl Filter {
     /// All.
@@ -84,6 +86,11 @@ impl Filter {
             Self::Vmf8 => "vmf8",
             Self::Vmf => "vmf",
         }
+    }
+
+    /// Whether it is of Xu et al. 2017.
+    pub fn is_vmf(self) -> bool {
+        matches!(self.storage(), Storage::Cells(_))
     }
 
     /// How its lobes are masked.
@@ -131,24 +138,25 @@ impl Storage {
         }
     }
 
-    /// What a lobe adds; as many numbers as [`Self::layout`] says.
-    fn encode(self, lobe: &Lobe, literal: bool) -> [f64; 6] {
+    /// What a lobe of a texel with this normal adds; as many numbers as [`Self::layout`] says.
+    fn encode(self, lobe: &Lobe, normal: Option<DVec3>, literal: bool) -> [f64; 8] {
         let w = lobe.weight;
         match self {
             Self::Directions { .. } => {
                 let mu = w * lobe.mu;
-                [mu.x, mu.y, mu.z, w * lobe.kappa, w, 0.0]
+                [mu.x, mu.y, mu.z, w * lobe.kappa, w, 0.0, 0.0, 0.0]
             }
             Self::Slopes { apart } => {
                 let b = slope::of(lobe.mu);
                 let baked = slope::variance(lobe.kappa);
                 let [xx, xy, yy] = if apart { slope::carried(b, lobe.kappa) } else { [baked, 0.0, baked] };
-                [w * b.x, w * b.y, w * (b.x * b.x + xx), w * (b.x * b.y + xy), w * (b.y * b.y + yy), w]
+                [w * b.x, w * b.y, w * (b.x * b.x + xx), w * (b.x * b.y + xy), w * (b.y * b.y + yy), w, 0.0, 0.0]
             }
             Self::Cells(_) => {
                 let length = if literal { 1.0 - literal::spread(lobe.kappa) } else { vmf::mean_cosine(lobe.kappa) };
                 let r = w * length * lobe.mu;
-                [r.x, r.y, r.z, w, w * length, 0.0]
+                let n = normal.map_or(r, |normal| w * normal);
+                [r.x, r.y, r.z, w, w * length, n.x, n.y, n.z]
             }
         }
     }
@@ -160,6 +168,7 @@ pub struct Filtered<'a> {
     filter: Filter,
     map: Cow<'a, BrdfMap>,
     literal: bool,
+    division: Division,
     /// The mean concentration of the map.
     constant: f64,
     mips: Mips,
@@ -182,8 +191,15 @@ impl<'a> Filtered<'a> {
         let constant =
             map.lobes().iter().map(|l| l.weight * l.kappa).sum::<f64>() * map.lobes_per_texel() as f64 / map.lobes().len() as f64;
         let (slots, stride) = filter.storage().layout(map.lobes_per_texel());
-        let mips = Mips::new(map.size(), slots * stride, |i, out| encode(filter.storage(), map.texel(i), literal, out));
-        Self { filter, map, literal, constant, mips }
+        let mips =
+            Mips::new(map.size(), slots * stride, |i, out| encode(filter.storage(), map.texel(i), map.normal(i), literal, out));
+        let division = if literal { Division::PRINTED } else { Division::default() };
+        Self { filter, map, literal, division, constant, mips }
+    }
+
+    /// The same with another rule for the cells of [`Filter::Vmf`].
+    pub fn divided(self, division: Division) -> Self {
+        Self { division, ..self }
     }
 
     /// How many levels there are.
@@ -204,7 +220,7 @@ impl<'a> Filtered<'a> {
         let lobes = self.map.texel(i);
         let (slots, stride) = self.filter.storage().layout(self.map.lobes_per_texel());
         let mut out = vec![0.0; slots * stride];
-        encode(self.filter.storage(), lobes, self.literal, &mut out);
+        encode(self.filter.storage(), lobes, self.map.normal(i), self.literal, &mut out);
         (!lobes.is_empty()).then_some(out)
     }
 
@@ -226,25 +242,50 @@ impl<'a> Filtered<'a> {
         match self.filter.storage() {
             Storage::Directions { .. } => Mixture::Vmf(texel.as_chunks().0.iter().filter_map(|t| self.direction(*t)).collect()),
             Storage::Slopes { .. } => Mixture::Slopes(texel.as_chunks().0.iter().filter_map(|t| gaussian(*t)).collect()),
-            Storage::Cells(_) => {
-                let cells: Vec<Cell> = texel.as_chunks().0.iter().map(|t| Cell(*t)).collect();
-                let mut lobes = Vec::new();
-                if self.filter == Filter::Vmf {
-                    self.divide(&cells, 0, 1.0, &mut lobes);
-                } else {
-                    lobes.extend(cells.iter().filter_map(|cell| cell.lobe(self.literal, 1.0)));
-                }
-                Mixture::Vmf(lobes)
-            }
+            Storage::Cells(_) => Mixture::Vmf(self.cells(texel).into_iter().map(|(lobe, _)| lobe).collect()),
         }
     }
 
-    /// The mean vector of what is stored, of a length above 0: of lobes kept apart the first one's, of slopes their frame's normal.
-    pub fn mean_vector(&self, texel: &[f64]) -> DVec3 {
-        let vector = |t: &[f64; 5]| DVec3::new(t[0], t[1], t[2]);
+    /// The normals below each lobe of [`Self::decode`], of any length above 0; none where lobes are not by cells.
+    pub fn normals(&self, texel: &[f64]) -> Vec<DVec3> {
         match self.filter.storage() {
-            Storage::Directions { .. } => texel.as_chunks().0.first().map_or(DVec3::Z, vector),
-            Storage::Cells(_) => texel.as_chunks().0.iter().map(vector).sum(),
+            Storage::Cells(_) => self.cells(texel).into_iter().map(|(_, normal)| normal).collect(),
+            Storage::Directions { .. } | Storage::Slopes { .. } => Vec::new(),
+        }
+    }
+
+    /// The mean concentration of what is below each of the `count` lobes of [`Self::decode`]; none for slopes.
+    pub fn concentrations_below(&self, texel: &[f64], count: usize) -> Vec<f64> {
+        match self.filter.storage() {
+            Storage::Directions { .. } if self.filter == Filter::Fixed => vec![self.constant; count],
+            Storage::Directions { .. } => texel.as_chunks().0.iter().map(|t: &[f64; DIRECTION]| t[3] / t[4]).collect(),
+            Storage::Cells(_) => {
+                let all = texel.as_chunks().0.iter().fold(Cell([0.0; CELL]), |sum, t| sum.plus(&Cell(*t)));
+                vec![vmf::concentration(all.base_spread()); count]
+            }
+            Storage::Slopes { .. } => Vec::new(),
+        }
+    }
+
+    /// The lobes of cells, and the normals below them.
+    fn cells(&self, texel: &[f64]) -> Vec<(Lobe, DVec3)> {
+        let cells: Vec<Cell> = texel.as_chunks().0.iter().map(|t| Cell(*t)).collect();
+        let mut lobes = Vec::new();
+        if self.filter == Filter::Vmf {
+            self.divide(&cells, 0, 1.0, &mut lobes);
+        } else {
+            lobes.extend(cells.iter().filter_map(|cell| cell.lobe(self.literal, 1.0)));
+        }
+        lobes
+    }
+
+    /// A vector along the mean normal of what is stored, if lobes are about it: of slopes their frame's.
+    pub fn mean_vector(&self, texel: &[f64]) -> DVec3 {
+        match self.filter.storage() {
+            Storage::Directions { .. } => {
+                texel.as_chunks().0.first().map_or(DVec3::Z, |t: &[f64; DIRECTION]| DVec3::new(t[0], t[1], t[2]))
+            }
+            Storage::Cells(_) => texel.as_chunks().0.iter().map(|t| Cell(*t).normal()).sum(),
             Storage::Slopes { .. } => DVec3::Z,
         }
     }
@@ -266,9 +307,9 @@ impl<'a> Filtered<'a> {
     }
 
     /// The lobes of cells, all of them or the two halves of one of four: as one cell's lobe, divided, or between the two.
-    fn divide(&self, cells: &[Cell], depth: usize, share: f64, lobes: &mut Vec<Lobe>) {
+    fn divide(&self, cells: &[Cell], depth: usize, share: f64, lobes: &mut Vec<(Lobe, DVec3)>) {
         let whole = cells.iter().fold(Cell([0.0; CELL]), |sum, cell| sum.plus(cell));
-        let kept = if depth == PRINTED_LENGTHS.len() { 1.0 } else { self.kept(&whole, depth) };
+        let kept = if depth == DIVISIONS { 1.0 } else { self.kept(&whole, depth) };
         if kept > 0.0 {
             lobes.extend(whole.lobe(self.literal, share * kept));
         }
@@ -282,8 +323,8 @@ impl<'a> Filtered<'a> {
     /// How much of a cell's one lobe stays beside those of its parts: by how far its spread goes beyond that of its lobes, or
     /// all or none by the length of its mean vector.
     fn kept(&self, cell: &Cell, depth: usize) -> f64 {
-        if self.literal {
-            return f64::from(u8::from(1.0 - cell.spread() >= PRINTED_LENGTHS[depth]));
+        if let Division::Lengths(lengths) = self.division {
+            return f64::from(u8::from(lengths.get(depth).is_none_or(|length| 1.0 - cell.spread() >= *length)));
         }
         let ratio = cell.spread() / (SPREAD_RATIO * cell.base_spread());
         let t = ((1.25 - ratio) / 0.5).clamp(0.0, 1.0);
@@ -324,12 +365,12 @@ impl Mul<f64> for Sum {
 /// Lobes of less weight are none.
 const LEAST_WEIGHT: f64 = 1e-12;
 
-fn encode(storage: Storage, lobes: &[Lobe], literal: bool, out: &mut [f64]) {
+fn encode(storage: Storage, lobes: &[Lobe], normal: Option<DVec3>, literal: bool, out: &mut [f64]) {
     out.fill(0.0);
     let (_, stride) = storage.layout(lobes.len());
     for (i, lobe) in lobes.iter().enumerate() {
         let at = storage.slot(i, lobe) * stride;
-        out[at..at + stride].iter_mut().zip(storage.encode(lobe, literal)).for_each(|(sum, c)| *sum += c);
+        out[at..at + stride].iter_mut().zip(storage.encode(lobe, normal, literal)).for_each(|(sum, c)| *sum += c);
     }
 }
 
@@ -365,9 +406,15 @@ impl Cell {
         (1.0 - self.0[4] / self.weight().max(LEAST_WEIGHT)).max(LEAST_SPREAD)
     }
 
-    fn lobe(&self, literal: bool, share: f64) -> Option<Lobe> {
+    fn normal(&self) -> DVec3 {
+        DVec3::new(self.0[5], self.0[6], self.0[7])
+    }
+
+    /// Its lobe and the normal below.
+    fn lobe(&self, literal: bool, share: f64) -> Option<(Lobe, DVec3)> {
         let kappa = if literal { literal::concentration(self.spread()) } else { vmf::concentration(self.spread()) };
         let mu = self.sum().try_normalize().unwrap_or(DVec3::Z);
-        (self.weight() > LEAST_WEIGHT).then(|| Lobe { mu, kappa, weight: share * self.weight() })
+        let lobe = Lobe { mu, kappa, weight: share * self.weight() };
+        (self.weight() > LEAST_WEIGHT).then_some((lobe, self.normal()))
     }
 }

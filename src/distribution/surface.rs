@@ -1,16 +1,16 @@
 //! Reflection by the lobes that a filter finds at a sample, the twin of `glsl/include/lobes.glsl`.
 //!
-//! Where a material's lobes are about its normal, a lobe that is found is a *facet*: a surface of its own with the lobe's direction
-//! for a normal, so that its masking, its base and its cosine are those of normals that the pixel has, and not of their mean.
-//! Lobes about other directions are one distribution of normals about the mean normal; Gaussians of slopes (LEAN, LEADR) are one
-//! about the surface's own.
+//! A lobe is a *facet*: a surface of its own, with the normal of what is below it, so that its masking, its base and its cosine are
+//! those of normals that the pixel has, and not of their mean. Each place below has its lobes about its own normal, where they fill
+//! the projected area: their integral over directions is 1 over the mean cosine there, and that of a wider lobe is made the same.
+//! Gaussians of slopes (LEAN, LEADR) are one distribution about the surface's own normal, which fills its area.
 
 use crate::distribution::effective;
 use crate::distribution::mixture::{Masking, Mixture};
 use crate::distribution::vmf::{self, Lobe};
 use crate::material::{LEAST_ALPHA, MOST_CONCENTRATION};
 use crate::reflectance::vmf::LEAST_PROJECTED_AREA;
-use crate::reflectance::{BlinnPhong, Model, Reflectance, cavity, ggx};
+use crate::reflectance::{BlinnPhong, Model, Reflectance, ggx};
 use glam::{DVec2, DVec3};
 use std::f64::consts::PI;
 
@@ -24,8 +24,12 @@ pub struct FoundLobes {
     pub normal: DVec3,
     /// In the tangent frame, of weights that sum to 1.
     pub lobes: Mixture,
-    /// Whether the material's own lobes are all about its normal.
-    pub upright: bool,
+    /// The normals below each lobe, unit; none for slopes.
+    pub normals: Vec<DVec3>,
+    /// The mean concentration of the lobes below each; none for slopes.
+    pub below: Vec<f64>,
+    /// The mean cosine of the directions of a place's lobes to its normal.
+    pub facing: f64,
     /// How they are masked, if they are slopes.
     pub masking: Masking,
 }
@@ -43,13 +47,21 @@ impl FoundLobes {
     }
 }
 
+/// The mean cosine over solid angle of a model's lobe of concentration `kappa` about its direction.
+fn mean_cosine(model: &Model, kappa: f64) -> f64 {
+    match model {
+        Model::Ggx(_) => effective::ggx_mean_cosine((2.0 / kappa).sqrt().clamp(LEAST_ALPHA, 1.0)),
+        _ => vmf::mean_cosine(kappa).max(LEAST_PROJECTED_AREA),
+    }
+}
+
 /// A model with the lobes that were found in the place of its own, in the frame about the shading normal.
 #[derive(Clone, Debug)]
 pub struct Surface {
     /// With the colours of its maps.
     model: Model,
     lobes: Mixture,
-    facets: bool,
+    normals: Vec<DVec3>,
     masking: Masking,
     /// Factor on what is specular, and albedo below: of vMF lobes, which have none of their own.
     specular: DVec3,
@@ -60,10 +72,16 @@ impl Surface {
     /// `model` with `found`. `specular` and `base` are a factor on, and the albedo under, vMF lobes.
     pub fn new(model: Model, found: &FoundLobes, specular: DVec3, base: DVec3) -> Self {
         let frame = effective::about(found.normal).transpose();
+        let area = |kappa| mean_cosine(&model, kappa);
+        let turned = |(l, below): (&Lobe, &f64)| {
+            let weight = l.weight * area(l.kappa) / (found.facing * area(*below));
+            Lobe { mu: frame * l.mu, weight, ..*l }
+        };
         let lobes = match &found.lobes {
-            Mixture::Vmf(lobes) => Mixture::Vmf(lobes.iter().map(|l| Lobe { mu: frame * l.mu, ..*l }).collect()),
+            Mixture::Vmf(lobes) => Mixture::Vmf(lobes.iter().zip(&found.below).map(turned).collect()),
             slopes @ Mixture::Slopes(_) => slopes.clone(),
         };
+        let normals = found.normals.iter().map(|n| frame * *n).collect();
         let total = match &model {
             Model::Vmf(vmf) => vmf.lobes().iter().map(|l| l.weight).sum(),
             _ => 1.0,
@@ -73,7 +91,7 @@ impl Surface {
             Model::BlinnPhong(b) => (b.specular, b.albedo),
             Model::Vmf(_) | Model::Table(_) | Model::Turned(_) => (specular * total, base),
         };
-        Self { model, lobes, facets: found.upright, masking: found.masking, specular, base }
+        Self { model, lobes, normals, masking: found.masking, specular, base }
     }
 
     /// Fresnel reflectance, and the base below it.
@@ -86,12 +104,12 @@ impl Surface {
         }
     }
 
-    /// `D G / (4 cos cos)` of a facet with cosines `ci` and `co` to light and viewer; `square` is the squared distance of the half
-    /// vector from its direction, which sharp lobes need, `across` the half vector's cosine to the viewer.
-    fn facet(&self, kappa: f64, [ci, co]: [f64; 2], square: f64, across: f64) -> f64 {
+    /// `D G / (4 cos cos)` of a facet whose normal has the cosines `ci`, `co` and `ch` to light, viewer and half vector; `square` is the
+    /// squared distance of the half vector from the lobe's direction, which sharp lobes need, `across` its cosine to the viewer.
+    fn facet(&self, kappa: f64, [ci, co, ch]: [f64; 3], square: f64, across: f64) -> f64 {
         let cosine = 1.0 - 0.5 * square;
         let h = DVec3::new((square * (1.0 - 0.25 * square)).max(0.0).sqrt(), 0.0, cosine);
-        let cavity = (0.25 / (ci * co)).min(0.5 * cosine.max(0.0) / (across * ci.max(co)));
+        let cavity = (0.25 / (ci * co)).min(0.5 * ch.max(0.0) / (across * ci.max(co)));
         match &self.model {
             Model::Ggx(_) if cosine > 0.0 => {
                 let alpha = (2.0 / kappa).sqrt().clamp(LEAST_ALPHA, 1.0);
@@ -119,20 +137,20 @@ impl Reflectance for Surface {
         let across = wo.dot(h);
         let (fresnel, below) = self.colours(across);
         let (specular, lit) = match &self.lobes {
-            Mixture::Vmf(lobes) if self.facets => {
-                let (mut specular, mut lit) = (0.0, 0.0);
-                for lobe in lobes {
-                    let ci = lobe.mu.dot(wi);
+            Mixture::Vmf(lobes) => {
+                let (mut specular, mut lit, mut weights) = (0.0, 0.0, 0.0);
+                for (lobe, normal) in lobes.iter().zip(&self.normals) {
+                    weights += lobe.weight;
+                    let ci = normal.dot(wi);
                     if ci <= 0.0 {
                         continue;
                     }
-                    let cosines = [ci, lobe.mu.dot(wo).max(FACING)];
+                    let cosines = [ci, normal.dot(wo).max(FACING), normal.dot(h)];
                     specular += lobe.weight * ci * self.facet(lobe.kappa, cosines, (h - lobe.mu).length_squared(), across);
                     lit += lobe.weight * ci;
                 }
-                (specular / wi.z, lit / wi.z)
+                (specular / wi.z, lit / wi.z / f64::max(weights, f64::MIN_POSITIVE))
             }
-            Mixture::Vmf(_) => (self.lobes.distribution(h) * cavity::masking(wi, wo, h), 1.0),
             Mixture::Slopes(lobes) => {
                 let lit = |b: DVec2| (-b).extend(1.0).normalize().dot(wi).max(0.0);
                 let lit = lobes.iter().map(|l| l.weight * lit(l.mean)).sum::<f64>();

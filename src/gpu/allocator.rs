@@ -28,6 +28,11 @@ impl PooledAllocator {
         self.peak
     }
 
+    /// Bytes that are live.
+    pub fn live_bytes(&self) -> u64 {
+        self.live
+    }
+
     /// Blocks that are out.
     pub fn live_blocks(&self) -> usize {
         self.blocks.len()

@@ -287,6 +287,11 @@ impl Headless {
         self.memory.as_ref().map_or(0, PooledAllocator::peak_bytes)
     }
 
+    /// Bytes of device memory that are allocated.
+    pub fn live_bytes(&self) -> u64 {
+        self.memory.as_ref().map_or(0, PooledAllocator::live_bytes)
+    }
+
     /// Validation messages so far.
     pub fn messages(&self) -> Vec<String> {
         self.instance.messages.lock().unwrap_or_else(PoisonError::into_inner).clone()

@@ -26,5 +26,7 @@ pub mod scene;
 pub mod sequence;
 pub mod session;
 pub mod stats;
+pub mod supersample;
 pub mod texture;
+mod window;
 pub mod world;

@@ -3,6 +3,7 @@
 use crate::frequency::allocation::Allocation;
 use crate::gpu::timer::FrameTimings;
 use crate::offline::aov::Aov;
+use crate::offline::bench::quality::Noise;
 use crate::offline::error::Result;
 use crate::offline::headless::{Headless, Options};
 use crate::offline::image_io::LinearImage;
@@ -10,6 +11,7 @@ use crate::offline::levels;
 use crate::offline::rates;
 use crate::offline::session::Session;
 use crate::offline::stats::{Pixels, Quantiles, Samples, Stats, pass_times};
+use crate::offline::supersample;
 use crate::offline::world::World;
 use crate::{Config, Estimator, Rate, Requirements};
 use serde_json::json;
@@ -35,6 +37,10 @@ pub struct Settings {
     pub aovs: Vec<Aov>,
     /// Directions a pixel of a converged image instead, at the full rate with the default estimator.
     pub reference: Option<u32>,
+    /// Joint sub-samples of position and direction a pixel, in the place of a filter and of the configuration's directions:
+    /// [`supersample`]. At the full rate, one sample a pixel, with [`Estimator::Mis`] or [`Estimator::Brdf`], and without
+    /// extra layers.
+    pub supersample: Option<u32>,
     /// Whether to time frames.
     pub timed: bool,
     /// Device.
@@ -44,12 +50,17 @@ pub struct Settings {
 impl Settings {
     /// One frame of `config` with nothing beside it.
     pub fn new(config: Config) -> Self {
-        Self { config, oracle: false, seed: 0, aovs: Vec::new(), reference: None, timed: false, device: Options::default() }
+        let (aovs, device) = (Vec::new(), Options::default());
+        Self { config, oracle: false, seed: 0, aovs, reference: None, supersample: None, timed: false, device }
     }
 
-    /// Frames of the renderer that make one image.
-    pub(super) fn chunks(&self) -> u32 {
-        self.reference.map_or(1, |n| n.div_ceil(REFERENCE_CHUNK))
+    /// Frames of the renderer, of [`open`]'s configuration, that make one image.
+    pub(super) fn chunks(&self, config: &Config) -> u32 {
+        match (self.supersample, self.reference) {
+            (Some(samples), _) => supersample::frames(self, config, samples),
+            (None, Some(directions)) => directions.div_ceil(REFERENCE_CHUNK),
+            (None, None) => 1,
+        }
     }
 
     /// Brings a session of [`Self::config`] to where its first frame can follow.
@@ -99,10 +110,10 @@ pub struct Rendered {
 pub fn render(world: &World, settings: &Settings, progress: &mut dyn FnMut(u32, u32)) -> Result<Rendered> {
     let (mut session, config) = open(world, settings)?;
     settings.prepare(&mut session, world, &config)?;
-    let chunks = settings.chunks();
+    let chunks = settings.chunks(&config);
     let total = chunks + if settings.timed { WARM_UP + TIMED } else { 0 };
     let mut done = 0;
-    let image = image(&mut session, settings, &config, 0, &mut |_| {
+    let shot = image(&mut session, settings, &config, 0, &mut |_| {
         done += 1;
         progress(done, total);
     })?;
@@ -116,28 +127,62 @@ pub fn render(world: &World, settings: &Settings, progress: &mut dyn FnMut(u32, 
         }
         progress(chunks + frame + 1, total);
     }
-    let stats = statistics(world, settings, &config, &mut session, &timings)?;
-    Ok(Rendered { image, stats })
+    let counts = shot.counts(&mut session, settings, &config)?;
+    let mut stats = report(world, settings, &config, &session, &timings, counts);
+    stats.noise = shot.noise;
+    Ok(Rendered { image: shot.image, stats })
 }
 
 /// A session of `world` with these settings.
 pub(super) fn open(world: &World, settings: &Settings) -> Result<(Session, Config)> {
-    let config = settings.config();
+    let config = match settings.supersample {
+        Some(samples) => settings.supersampled(world, samples)?,
+        None => settings.config(),
+    };
     config.validate()?;
     let headless = Headless::new(&settings.device, &Requirements::of(&config))?;
-    Ok((Session::new(headless, world, &config)?, config))
+    let session = match settings.supersample {
+        Some(_) => Session::new(headless, &supersample::at_base(world), &config)?,
+        None => Session::new(headless, world, &config)?,
+    };
+    Ok((session, config))
+}
+
+/// An image and what is known of it.
+pub(super) struct Shot {
+    pub image: LinearImage,
+    /// Of a supersampled one.
+    pub noise: Option<Noise>,
+    /// Of a supersampled one, over all pixels.
+    coverage: Option<f64>,
+}
+
+impl Shot {
+    /// Samples, and the directions drawn for them: of the session's last frame, or of all of a supersampled image, whose
+    /// samples are its pixels.
+    pub fn counts(&self, session: &mut Session, settings: &Settings, config: &Config) -> Result<(Pixels, u64)> {
+        let Some((samples, coverage)) = settings.supersample.zip(self.coverage) else { return counts(session, config) };
+        let alpha = self.image.channel("A").unwrap_or_default();
+        let covered = alpha.iter().filter(|a| **a > 0.0).count() as u64;
+        let taken = coverage * f64::from(supersample::taken(settings, config, samples));
+        Ok((Pixels { covered, shaded: covered, by_level: BTreeMap::from([(0, covered)]) }, taken.round() as u64))
+    }
 }
 
 /// What the session shows, as frame `number`, with its layers. `each` is called after every frame of the renderer, of which a
-/// reference has several.
+/// reference and a supersampled image have several.
 pub(super) fn image(
     session: &mut Session,
     settings: &Settings,
     config: &Config,
     number: u32,
     each: &mut dyn FnMut(&Session),
-) -> Result<LinearImage> {
-    let chunks = settings.chunks();
+) -> Result<Shot> {
+    if let Some(samples) = settings.supersample {
+        let found = supersample::image(session, settings, config, [samples, number], each)?;
+        return Ok(Shot { image: found.image, noise: found.noise, coverage: Some(found.coverage) });
+    }
+    let chunks = settings.chunks(config);
     let mut sum: Vec<f64> = Vec::new();
     for chunk in 0..chunks {
         session.frame([settings.seed, number.wrapping_mul(chunks).wrapping_add(chunk)])?;
@@ -153,7 +198,7 @@ pub(super) fn image(
     for aov in &settings.aovs {
         channels.extend(aov.read(session, config)?);
     }
-    Ok(LinearImage { width, height, channels })
+    Ok(Shot { image: LinearImage { width, height, channels }, noise: None, coverage: None })
 }
 
 /// Of the session's last frame: samples, and the directions drawn for them.
@@ -203,8 +248,10 @@ pub(super) fn report(
     let values = BTreeMap::from([
         ("rate", json!(settings.rate())),
         ("lmax", json!(config.lmax)),
-        ("filter", json!(config.filter.name())),
+        ("filter", json!(settings.supersample.map_or(config.filter.name(), |_| "supersample"))),
         ("bins", json!(config.bins.name())),
+        ("anisotropy", json!(config.anisotropy)),
+        ("literal_lobes", json!(config.takes_lobes_literally())),
         ("probes", json!(config.probes)),
         ("spc", json!(config.samples_per_cycle)),
         ("operator", json!(format!("{:?}", config.operator).to_lowercase())),
@@ -212,7 +259,7 @@ pub(super) fn report(
         ("eps", json!(config.eps)),
         ("geometric", json!(config.geometric)),
         ("estimator", json!(estimator)),
-        ("samples", json!(config.directions)),
+        ("samples", json!(settings.supersample.unwrap_or(config.directions))),
         ("np_rule", json!(config.allocation.name())),
         ("aa", json!(config.samples_per_side.pow(2))),
         ("seed", json!(settings.seed)),
@@ -222,10 +269,11 @@ pub(super) fn report(
         schema: 1,
         device: session.headless().info().clone(),
         scene: world.name.clone(),
-        extent: config.extent,
+        extent: settings.config.extent,
         settings: values,
         pixels,
         samples: Samples { taken, budget },
+        noise: None,
         passes: pass_times(timings, session.pass_bytes()),
         frame_ms: Quantiles::of(timings.iter().map(|t| t.span_ms).collect()),
         setup_ms: session.setup().iter().copied().collect(),

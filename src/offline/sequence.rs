@@ -1,9 +1,10 @@
 //! The frames of an animation, with one session for all of them.
 
 use crate::offline::animation::AnimatedWorld;
+use crate::offline::bench::quality::Noise;
 use crate::offline::error::{Error, Result};
 use crate::offline::image_io::LinearImage;
-use crate::offline::render::{Settings, TIMED, WARM_UP, counts, image, open, report};
+use crate::offline::render::{Settings, TIMED, WARM_UP, image, open, report};
 use crate::offline::stats::{Pixels, Stats};
 use serde_json::json;
 use std::collections::BTreeMap;
@@ -29,12 +30,6 @@ pub fn render_frames(
         let expected = format!("A..B with A below B and B at most {most}");
         return Err(Error::argument("frames", expected, format!("{}..{}", frames.start, frames.end)));
     }
-    let chunks = settings.chunks();
-    let drawn = (frames.end - frames.start).saturating_mul(chunks);
-    let repeated = if settings.timed { 1 + TIMED.saturating_sub(drawn) } else { 0 };
-    let warm_up = if settings.timed { WARM_UP } else { 0 };
-    let total = drawn.saturating_add(warm_up + repeated);
-
     let mut posing = 0.0;
     let mut show = |world: &mut AnimatedWorld, number| {
         let clock = Instant::now();
@@ -43,7 +38,11 @@ pub fn render_frames(
     };
     show(world, frames.start);
     let (mut session, config) = open(world.world(), settings)?;
-    let (mut times, mut counted, mut done) = (Vec::new(), Vec::new(), 0);
+    let drawn = (frames.end - frames.start).saturating_mul(settings.chunks(&config));
+    let repeated = if settings.timed { 1 + TIMED.saturating_sub(drawn) } else { 0 };
+    let warm_up = if settings.timed { WARM_UP } else { 0 };
+    let total = drawn.saturating_add(warm_up + repeated);
+    let (mut times, mut counted, mut noise, mut done) = (Vec::new(), Vec::new(), Vec::new(), 0);
     for number in frames.clone() {
         if number != frames.start {
             show(world, number);
@@ -60,7 +59,7 @@ pub fn render_frames(
                 progress(done, total);
             }
         }
-        let image = image(&mut session, settings, &config, number, &mut |session| {
+        let shot = image(&mut session, settings, &config, number, &mut |session| {
             // A frame's times arrive with the next one: the first brings the warm-up's.
             if done > warm_up {
                 times.extend(session.timings().cloned());
@@ -68,10 +67,11 @@ pub fn render_frames(
             done += 1;
             progress(done, total);
         })?;
-        write(number, image)?;
         if settings.timed {
-            counted.push(counts(&mut session, &config)?);
+            counted.push(shot.counts(&mut session, settings, &config)?);
         }
+        noise.extend(shot.noise);
+        write(number, shot.image)?;
     }
     for _ in 0..repeated {
         session.frame([settings.seed, frames.end - 1])?;
@@ -80,6 +80,7 @@ pub fn render_frames(
         progress(done, total);
     }
     let mut stats = report(world.world(), settings, &config, &session, &times, mean(&counted));
+    stats.noise = Noise::mean(&noise);
     stats.settings.insert("frames", json!([frames.start, frames.end]));
     stats.setup_ms.insert("animation", posing);
     Ok(stats)

@@ -16,6 +16,7 @@ use crate::offline::lobe_cache;
 use crate::offline::mesh_buffers::MeshBuffers;
 pub use crate::offline::read_back::MomentLevels;
 use crate::offline::read_back::copy_buffer;
+use crate::offline::window::{Window, near};
 use crate::offline::world::{Camera, World};
 use crate::pass::PassContext;
 use crate::pass::probe::Probe;
@@ -24,18 +25,17 @@ use crate::renderer::Renderer;
 use crate::sampling::LatLong;
 use crate::{Config, Draw, EnvironmentUse, FrameInputs, GBufferInput, Light, View};
 use ash::vk;
-use glam::{DMat4, DVec4, Mat4};
 use std::collections::HashMap;
 use std::sync::Arc;
 use std::time::Instant;
 
 /// The set-up time of uploading meshes.
 const MESHES: &str = "meshes";
-/// Near plane of the rasteriser as a fraction of the scene's reach; there is no far plane.
-const NEAR: f64 = 1e-3;
 
 /// What every frame of the session shows.
 struct Shown {
+    camera: Camera,
+    near: f64,
     view: View,
     draws: Vec<Draw>,
     environment: EnvironmentUse,
@@ -53,8 +53,11 @@ impl Shown {
             rotation: e.rotation as f32,
             visible: e.visible,
         });
+        let (camera, near) = (world.camera, near(world));
         Self {
-            view: view(&world.camera, extent, near(world)),
+            camera,
+            near,
+            view: Window::whole(extent).view(&camera, near),
             draws: Vec::new(),
             environment,
             lights: world.lights.clone(),
@@ -63,7 +66,7 @@ impl Shown {
     }
 
     fn inputs(&self, seed: [u32; 2]) -> FrameInputs<'_> {
-        let Self { view, draws, environment, lights, levels } = self;
+        let Self { view, draws, environment, lights, levels, .. } = self;
         let frame = FrameInputs::new(0, *view, GBufferInput::Draws(draws));
         let levels = levels.as_ref().map(|image| ImageRef {
             image: image.handle,
@@ -89,6 +92,7 @@ pub struct Session {
     meshes: HashMap<usize, MeshBuffers>,
     shown: Shown,
     setup: SetupTimes,
+    material_bytes: u64,
     record_ms: f64,
 }
 
@@ -108,6 +112,7 @@ impl Session {
         setup.push(("pipelines", milliseconds(clock)));
 
         let clock = Instant::now();
+        let others = headless.live_bytes();
         let mut materials: Vec<_> = world.materials.iter().map(|m| m.surface()).collect();
         if config.rate == crate::Rate::Bandwidth {
             let folder = lobe_cache::cache_folder();
@@ -119,9 +124,8 @@ impl Session {
         // SAFETY: the command buffer is recording and submitted at once.
         headless.submit(|cmd, memory| Ok(unsafe { renderer.record_materials(cmd, &materials, memory) }?))?;
         // Beside the work on the processor, with which the rest of it is told.
-        let of_maps = |name: &&str| [crate::pass::brdf_map::NAME, crate::pass::vmf_mips::NAME].contains(name);
-        let on_device: SetupTimes =
-            renderer.set_up_timings()?.unwrap_or_default().passes.into_iter().filter(|(name, _)| of_maps(name)).collect();
+        let on_device = of_maps(&renderer)?;
+        let material_bytes = headless.live_bytes().saturating_sub(others);
         let others: f64 = on_device.iter().map(|(_, time)| time).sum();
         setup.push((crate::pass::materials::NAME, milliseconds(clock) - others));
         setup.extend(on_device);
@@ -135,7 +139,8 @@ impl Session {
 
         let clock = Instant::now();
         let shown = Shown::of(world, config.extent);
-        let mut session = Self { headless, renderer: Some(renderer), meshes: HashMap::new(), shown, setup, record_ms: 0.0 };
+        let (meshes, record_ms) = (HashMap::new(), 0.0);
+        let mut session = Self { headless, renderer: Some(renderer), meshes, shown, setup, material_bytes, record_ms };
         session.upload_objects(world, &mut HashMap::new())?;
         session.reserve_cells(world)?;
         session.setup.push((MESHES, milliseconds(clock)));
@@ -151,7 +156,8 @@ impl Session {
     pub fn show(&mut self, world: &World) -> Result<()> {
         let clock = Instant::now();
         let extent = self.renderer.as_ref().ok_or_else(closed)?.config().extent;
-        self.shown.view = view(&world.camera, extent, near(world));
+        (self.shown.camera, self.shown.near) = (world.camera, near(world));
+        self.look_through(&Window::whole(extent));
         self.shown.draws.clear();
         let mut former = std::mem::take(&mut self.meshes);
         let uploaded = self.upload_objects(world, &mut former);
@@ -179,6 +185,23 @@ impl Session {
         // SAFETY: every submission was waited for.
         unsafe { bag.free(host.device, memory) };
         Ok(())
+    }
+
+    /// Shows a part of the camera's image from the next frame on, until [`Self::show`].
+    pub(super) fn look_through(&mut self, window: &Window) {
+        self.shown.view = window.view(&self.shown.camera, self.shown.near);
+    }
+
+    /// Makes the materials anew, as when they had changed: the GPU milliseconds of each pass that makes their maps.
+    ///
+    /// # Errors
+    /// The library's or the device's.
+    pub fn renew_materials(&mut self, world: &World) -> Result<SetupTimes> {
+        let renderer = self.renderer.as_mut().ok_or_else(closed)?;
+        let materials: Vec<_> = world.materials.iter().map(|m| m.surface()).collect();
+        // SAFETY: every submission is waited for; the command buffer is recording and submitted at once.
+        self.headless.submit(|cmd, memory| Ok(unsafe { renderer.record_materials(cmd, &materials, memory) }?))?;
+        of_maps(renderer)
     }
 
     /// Draws for all objects; what they need is taken out of `former` or uploaded.
@@ -314,6 +337,11 @@ impl Session {
         self.renderer.as_ref().map_or(&[], Renderer::pass_bytes)
     }
 
+    /// Bytes of device memory that the materials take: tables, textures, and the maps of the filter.
+    pub fn material_bytes(&self) -> u64 {
+        self.material_bytes
+    }
+
     /// Set-up times.
     pub fn setup(&self) -> &[(&'static str, f64)] {
         &self.setup
@@ -360,41 +388,16 @@ impl Drop for Session {
     }
 }
 
+/// Times of the passes that made the materials' maps.
+fn of_maps(renderer: &Renderer) -> Result<SetupTimes> {
+    let known = |name: &&str| [crate::pass::brdf_map::NAME, crate::pass::vmf_mips::NAME].contains(name);
+    Ok(renderer.set_up_timings()?.unwrap_or_default().passes.into_iter().filter(|(name, _)| known(name)).collect())
+}
+
 pub(super) fn closed() -> Error {
     Error::Device("the session is closed".into())
 }
 
 fn milliseconds(since: Instant) -> f64 {
     since.elapsed().as_secs_f64() * 1e3
-}
-
-/// A near plane that nothing visible crosses unless the camera stands inside an object.
-fn near(world: &World) -> f64 {
-    let reach = world.objects.iter().map(|o| {
-        let centre = o.transform().w_axis.truncate();
-        centre.distance(world.camera.position)
-    });
-    (reach.fold(0.0, f64::max) * NEAR).max(1e-6)
-}
-
-/// The camera as matrices: reversed depth is not needed, as depth travels in the surface image at full precision.
-fn view(camera: &Camera, extent: [u32; 2], near: f64) -> View {
-    let basis = camera.world_from_view();
-    let world_from_view = DMat4::from_cols(
-        basis.x_axis.extend(0.0),
-        basis.y_axis.extend(0.0),
-        basis.z_axis.extend(0.0),
-        camera.position.extend(1.0),
-    );
-    let f = 1.0 / (camera.fov_y.to_radians() / 2.0).tan();
-    let aspect = f64::from(extent[0]) / f64::from(extent[1]);
-    // Infinite far plane; Vulkan's y points down.
-    let clip_from_view = DMat4::from_cols(
-        DVec4::new(f / aspect, 0.0, 0.0, 0.0),
-        DVec4::new(0.0, -f, 0.0, 0.0),
-        DVec4::new(0.0, 0.0, -1.0, -1.0),
-        DVec4::new(0.0, 0.0, -near, 0.0),
-    );
-    let columns = |m: DMat4| -> [f32; 16] { Mat4::to_cols_array(&m.as_mat4()) };
-    View { world_from_view: columns(world_from_view), clip_from_view: columns(clip_from_view) }
 }

@@ -1,6 +1,7 @@
 //! What a render reports about itself: the `--stats` file, schema 1.
 
 use crate::gpu::timer::FrameTimings;
+use crate::offline::bench::quality::Noise;
 use crate::offline::headless::DeviceInfo;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -22,7 +23,10 @@ pub struct Stats {
     pub pixels: Pixels,
     /// Directions.
     pub samples: Samples,
-    /// Passes in recording order.
+    /// Noise of the image itself, from its two halves; of a sequence the mean over its images. Of supersampled ones only.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub noise: Option<Noise>,
+    /// Passes in recording order; of a supersampled image, of one of the renderer's frames that make it.
     pub passes: Vec<PassTime>,
     /// GPU span of the frame's passes in milliseconds.
     pub frame_ms: Quantiles,

@@ -1,7 +1,7 @@
 //! Pass 0b, continued: the lobes of each texel of a material's maps, as the filters store them (Xu et al. 2017, section 4;
 //! [`crate::moments`] is the f64 twin). Once a set of materials.
 
-use crate::config::{Filter, MOST_BASE_LOBES};
+use crate::config::{Config, Filter, MOST_BASE_LOBES};
 use crate::distribution::{self, vmf};
 use crate::error::Result;
 use crate::gpu::access::Access;
@@ -63,6 +63,7 @@ pub(crate) fn lobes(filtered: bool, parameter: Parameter) -> u32 {
         (false, _) => 0,
         (true, Parameter::Alpha) => 1,
         (true, Parameter::Exponent) => 2,
+        (true, Parameter::Ggx) => 3,
     }
 }
 
@@ -98,9 +99,10 @@ impl Layers {
             Some(F::Lean | F::Leadr) => (true, 2, 0),
             Some(F::LeanLobe) => (false, 2, 0),
             Some(F::Vmf4) => (false, 1, 4),
-            Some(F::Vmf8) => (false, 1, 8),
-            Some(F::Vmf) => (false, 1, 10),
+            Some(F::Vmf8 | F::Vmf) => (false, 1, 8),
         };
+        // With their spreads, four in a layer, and the normals below lobes that are about other directions.
+        let cells = cells + cells / 4 + if base.upright() { 0 } else { cells };
         let lobes = if merged { count.min(1) } else { count };
         Self { moments: usize::from(!base.upright()) + each * lobes, cells: if count > 0 { cells } else { 0 } }
     }
@@ -202,8 +204,9 @@ pub(crate) struct Work {
 pub(crate) struct BrdfMap(ComputePipeline);
 
 impl BrdfMap {
-    pub fn new(p: &mut PassContext<'_, '_>, filter: Filter) -> Result<Self> {
-        Ok(Self(ComputePipeline::new(p.build, p.modules, &INTERFACE, p.bridge, 0, &[number(filter)])?))
+    pub fn new(p: &mut PassContext<'_, '_>, config: &Config) -> Result<Self> {
+        let constants = [number(config.filter), u32::from(config.takes_lobes_literally())];
+        Ok(Self(ComputePipeline::new(p.build, p.modules, &INTERFACE, p.bridge, 0, &constants)?))
     }
 
     /// What the recording needs: `groups` of which the images are `classes`, from `first` on, as [`Group::images`] has them.

@@ -1,6 +1,6 @@
 //! Pass 2: what the surfaces' textures say at the pixel's scale: shading normals, factors, roughness and lobes.
 
-use crate::config::{Bins, Config};
+use crate::config::{Bins, Config, Division};
 use crate::error::Result;
 use crate::gpu::access::Access;
 use crate::gpu::buffer::Buffer;
@@ -65,8 +65,14 @@ impl Filter {
     pub fn new(p: &mut PassContext<'_, '_>, config: &Config, uses: Uses) -> Result<Self> {
         let [albedo, specular, normal, roughness, moments, cells] = uses;
         let (geometric, filter) = (u32::from(config.widened()), config.filter);
-        let camera = u32::from(config.bins == Bins::Camera);
-        let lobes = [brdf_map::number(filter), filter.lobe_layers(), config.anisotropy, camera];
+        let lengths = match config.division {
+            Division::Lengths(lengths) => lengths.map(|length| length as f32),
+            Division::SpreadRatio => [0.0; 2],
+        };
+        let [one, quarters] = lengths.map(f32::to_bits);
+        let read = [config.anisotropy, config.lod_bias.to_bits(), u32::from(config.takes_lobes_literally()), one, quarters];
+        let read = read.into_iter().chain([u32::from(config.bins == Bins::Camera)]);
+        let lobes = [brdf_map::number(filter), filter.lobe_layers()].into_iter().chain(read);
         let constants = [albedo, specular, normal, roughness, geometric, moments, cells];
         let constants: Vec<_> = constants.into_iter().chain(lobes).collect();
         Ok(Self(ComputePipeline::new(p.build, p.modules, &INTERFACE, p.bridge, p.slots, &constants)?))

@@ -1,6 +1,7 @@
 //! Materials' textures on the device: layers of arrays by size and format, and where each material's maps are.
 
 use crate::config::{Bins, Filter, MOST_BASE_LOBES};
+use crate::distribution::effective::Rule;
 use crate::error::{Error, Result};
 use crate::gpu::access::Access;
 use crate::gpu::buffer::Buffer;
@@ -37,7 +38,7 @@ struct Record {
     count: u32,
     upright: u32,
     concentration: f32,
-    unused: u32,
+    facing: f32,
 }
 
 /// What the `filter` pass reads.
@@ -82,6 +83,8 @@ pub(crate) type MomentArrays<'a> = [Option<(&'a Image, std::ops::Range<u32>)>; 2
 pub(crate) struct Reading<'a> {
     pub filter: Filter,
     pub bins: Bins,
+    /// How a base lobe counts.
+    pub rule: Rule,
     /// Whether the mesh's curvature widens lobes.
     pub widened: bool,
     /// There if the filter stores moments.
@@ -145,18 +148,22 @@ pub(super) fn code(place: Option<Place>) -> u32 {
     place.map_or(0, |(class, layer)| (layer << 3 | class) as u32 + 1)
 }
 
-/// A group, the first of a material's layers there and how many there are.
-type Placed = (usize, [Layers; 2]);
+/// A material's group, the first of its layers there and how many there are.
+struct GroupPlace {
+    group: usize,
+    first: Layers,
+    layers: Layers,
+}
 
-/// The moments of `materials`, of which `bases` say what is filtered: one group for each size. Of each material its group, the
-/// first of its layers there and how many there are. Cells of objects are none of the group's.
+/// The moments of `materials`, of which `bases` say what is filtered: one group for each size, and each material's place.
+/// Cells of objects are none of the group's.
 fn groups(
     materials: &[Material],
     bases: &[Option<Base>],
     sizes: Vec<[u32; 2]>,
     slots: &[Slots],
     reading: &Reading<'_>,
-) -> (Vec<Group>, Vec<Option<Placed>>) {
+) -> (Vec<Group>, Vec<Option<GroupPlace>>) {
     let mut groups: Vec<_> = sizes.into_iter().map(Group::new).collect();
     let mut place = |((material, base), slots): ((&Material, &Option<Base>), &Slots)| {
         let base = (*base)?;
@@ -166,7 +173,7 @@ fn groups(
         let source = Source { normal: slots.normal, roughness, rule: rule(material), base, parameter };
         let layers = Layers::of(reading.filter, &base);
         let cells = if reading.bins == Bins::Camera { 0 } else { layers.cells };
-        Some((group, [groups.get_mut(group)?.place(source, Layers { cells, ..layers }), layers]))
+        Some(GroupPlace { group, first: groups.get_mut(group)?.place(source, Layers { cells, ..layers }), layers })
     };
     let places = materials.iter().zip(bases).zip(slots).map(&mut place).collect();
     (groups, places)
@@ -175,7 +182,7 @@ fn groups(
 impl MapsUpload {
     pub fn new(build: &mut Build<'_>, materials: &[Material], reading: &Reading<'_>) -> Result<Self> {
         let filters = reading.passes.is_some();
-        let base = |material| if filters { Base::of(material) } else { None };
+        let base = |material| if filters { Base::of(material, reading.rule) } else { None };
         let bases: Vec<_> = materials.iter().map(base).collect();
         let wanted = materials.iter().zip(&bases).filter_map(|(m, base)| Some(base.as_ref()?.size(m)));
         let sizes = brdf_map::sizes(wanted, reading.filter.has_cells());
@@ -193,7 +200,7 @@ impl MapsUpload {
             .iter()
             .scan(classes.len(), |next, group| Some(std::mem::replace(next, *next + 1 + usize::from(group.layers.cells > 0))))
             .collect();
-        let place = |(group, [first, layers]): (usize, [Layers; 2])| {
+        let place = |GroupPlace { group, first, layers }: GroupPlace| {
             let class = *firsts.get(group)?;
             let of_cells = if camera { classes.len() + groups.len() + group } else { class + 1 };
             let cells = (layers.cells > 0).then_some(((of_cells, first.cells), layers.cells));
@@ -229,7 +236,8 @@ impl MapsUpload {
                 *uses |= 1 << class;
             }
             // Without maps a lobe about the normal is found as it is.
-            let lone = BaseLobes::of(&material.model).filter(|own| filters && own.upright() && own.lobes().len() == 1);
+            let lone =
+                BaseLobes::of(&material.model, reading.rule).filter(|own| filters && own.upright() && own.lobes().len() == 1);
             let lobes = base.or(lone.map(Base::Lobes)).unwrap_or(Base::Normals);
             unfiltered |= lobes.lobes().is_empty();
             let [albedo, specular, normal, roughness, moments, cells] = slots.map(code);
@@ -245,7 +253,7 @@ impl MapsUpload {
                 count: lobes.lobes().len() as u32,
                 upright: u32::from(lobes.upright()),
                 concentration: lobes.lobes().first().map_or(0.0, |lobe| lobe.kappa as f32),
-                unused: 0,
+                facing: lobes.facing() as f32,
             });
         }
         let classes = classes.iter().map(|class| upload(build, class)).collect::<Result<Vec<_>>>()?;

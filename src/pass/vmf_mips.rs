@@ -50,6 +50,7 @@ struct Push {
     lobe_layer: i32,
     cell_layer: i32,
     frame_layer: i32,
+    upright: u32,
 }
 
 /// The lobes of a material that go into cells.
@@ -58,13 +59,14 @@ pub(crate) struct Lobes {
     weights: [f32; MOST_BASE_LOBES],
     count: u32,
     layer: i32,
+    upright: bool,
 }
 
 impl Lobes {
     /// Of moments whose first layer is `moments`.
     pub fn of(base: &Base, moments: usize) -> Self {
         let layer = (moments + usize::from(!base.upright())) as i32;
-        Self { weights: brdf_map::weights(base.lobes()), count: base.lobes().len() as u32, layer }
+        Self { weights: brdf_map::weights(base.lobes()), count: base.lobes().len() as u32, layer, upright: base.upright() }
     }
 
     fn push(&self, cell_layer: usize) -> Push {
@@ -75,6 +77,7 @@ impl Lobes {
             lobe_layer: self.layer,
             cell_layer: cell_layer as i32,
             frame_layer: 0,
+            upright: u32::from(self.upright),
         }
     }
 }

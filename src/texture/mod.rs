@@ -12,7 +12,7 @@ use glam::{DVec2, DVec4, dvec4};
 use half::f16;
 
 pub use chain::{decode_srgb, encode_srgb};
-pub use classes::{Class, Classes, Slots};
+pub use classes::{Class, Classes, MAX_CLASSES, Slots};
 
 /// The largest side of a texture, in texels.
 pub const MAX_SIDE: u32 = 16_384;
@@ -146,6 +146,12 @@ impl Texture {
     pub fn level(&self, i: usize) -> ([u32; 2], &[u8]) {
         let Level { size, texels } = &self.levels[i.min(self.levels.len() - 1)];
         (*size, texels)
+    }
+
+    /// Level 0 alone.
+    #[cfg(feature = "offline")]
+    pub(crate) fn base(&self) -> Self {
+        Self { format: self.format, levels: self.levels.iter().take(1).cloned().collect() }
     }
 
     /// Bytes of all levels.

@@ -9,7 +9,7 @@ use passband::offline::session::Session;
 use passband::offline::world::World;
 use passband::reflectance::{ImportanceTable, LobeBandwidth, Reflectance};
 use passband::sampling::{luminance, sobol};
-use passband::{Config, Light, Material};
+use passband::{Config, Light, Material, Sampling};
 
 /// A light without extent varies faster than anything.
 const SHARPEST: f64 = 1e6;
@@ -95,7 +95,7 @@ impl<'a> Twin<'a> {
         let material = |m: &passband::offline::world::Material| {
             // Colour maps count with their mean: what a pixel sees that spans the whole.
             let surface = m.surface();
-            let mean = surface.at(DVec2::ZERO, [DVec2::splat(1e6); 2], 1).reflectance(&m.model);
+            let mean = surface.at(DVec2::ZERO, [DVec2::splat(1e6); 2], Sampling::default()).reflectance(&m.model);
             let textures = surface.texture_bandwidth(eps);
             (surface, ImportanceTable::build(&mean), LobeBandwidth::build(&m.model, eps), textures)
         };
@@ -131,7 +131,7 @@ impl<'a> Twin<'a> {
         let [u, v, ..] = frame.coordinates[at];
         let [ux, vx, uy, vy] = frame.derivatives[at];
         let steps = [DVec2::new(ux, vx), DVec2::new(uy, vy)];
-        let reflectance = material.at(DVec2::new(u, v), steps, 1).reflectance(&material.model);
+        let reflectance = material.at(DVec2::new(u, v), steps, Sampling::default()).reflectance(&material.model);
 
         let mut all = Directions { config, surface, found: Vec::new() };
         let blocks = ((block / frame.blocks[0]) << 16) | (block % frame.blocks[0]);

@@ -5,7 +5,7 @@ use clap::ValueEnum;
 use indicatif::{ProgressBar, ProgressStyle};
 use passband::offline::bench::figures::Figure;
 use passband::offline::bench::report::Report;
-use passband::offline::bench::{reference, suites};
+use passband::offline::bench::{reference, suites, xu};
 use passband::offline::error::{Error, Result};
 use passband::offline::headless::Options;
 use passband::offline::image_io::{check_writable, write_atomically};
@@ -17,8 +17,10 @@ use std::process::ExitCode;
 mod plot;
 #[path = "bench_table.rs"]
 mod table;
+#[path = "bench_xu.rs"]
+mod xu_table;
 
-/// Measures what passes cost, and what variants of a frame gain at which error
+/// Measures what passes cost, what variants of a frame gain at which error, and how far filters are from the truth
 ///
 /// Frames of all variants alternate in one run; the last row is the first variant once more, whose difference from the first is
 /// the noise of the measurement. Errors are against converged images, which are rendered when first needed and kept in the
@@ -30,10 +32,10 @@ pub struct Args {
     /// What to measure
     #[arg(long)]
     suite: Suite,
-    /// How much of it: few scenes at 256x256, or all at 512x512
+    /// How much of it: few scenes at 256x256, or all at 512x512; of xu two at 128x128, or all at 256x256 and in motion
     #[arg(long, default_value = "quick")]
     preset: Preset,
-    /// Timed frames of each variant [default: 5 of quick, 9 of full]
+    /// Timed frames of each variant [default: 5 of quick, 9 of full; of xu 3 and 7]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=10_000))]
     rounds: Option<u32>,
     /// Image size [default: the scene's, else the preset's]
@@ -48,7 +50,8 @@ pub struct Args {
     /// Write plots of error over time and over shaded pixels into this folder, one for each scene
     #[arg(long, value_name = "FOLDER")]
     plots: Option<PathBuf>,
-    /// Write figures 6, 11, 12, 14 and 15 of Bagher et al. 2011 into this folder, of each scene of the quick preset or named here
+    /// Write figures into this folder: of bagher those of Bagher et al. 2011 (6, 11, 12, 14 and 15), of each scene of the quick
+    /// preset or named here; of xu the truth beside every filter, of each scene
     #[arg(long, value_name = "FOLDER")]
     figures: Option<PathBuf>,
     /// Write a page to look at
@@ -90,43 +93,82 @@ enum Preset {
 }
 
 impl Args {
-    fn order(&self) -> Result<suites::Order> {
-        let later = |yes: bool, what: &str| if yes { Err(Error::NotSupportedYet { what: what.into() }) } else { Ok(()) };
+    /// Refuses what no suite can do yet.
+    fn check(&self) -> Result<()> {
         later(self.report.is_some(), "--report")?;
         later(self.baseline.is_some(), "--baseline")?;
         later(self.resume.is_some(), "--resume")?;
         later(self.trace.is_some(), "--trace")?;
         later(!self.max.is_empty(), "bench --max")?;
-        later(!self.min.is_empty(), "bench --min")?;
+        later(!self.min.is_empty(), "bench --min")
+    }
+
+    fn preset(&self) -> suites::Preset {
+        match self.preset {
+            Preset::Quick => suites::Preset::Quick,
+            Preset::Full => suites::Preset::Full,
+        }
+    }
+
+    fn options(&self) -> Options {
+        Options { device: self.device.clone(), validate: false }
+    }
+
+    /// Of the suite xu.
+    fn filters(&self) -> Result<xu::Order> {
+        later(self.plots.is_some(), "--plots of --suite xu")?;
+        Ok(xu::Order {
+            preset: self.preset(),
+            rounds: self.rounds,
+            extent: self.size,
+            scenes: self.scenes.clone(),
+            device: self.options(),
+            root: PathBuf::new(),
+            cache: xu::cache_folder(),
+        })
+    }
+
+    fn order(&self) -> Result<suites::Order> {
         let suite = match self.suite {
             Suite::Passes => suites::Suite::Passes,
             Suite::Bagher => suites::Suite::Bagher,
             Suite::Xu | Suite::Tan | Suite::Residual | Suite::Joined | Suite::Scaling | Suite::All => {
-                return Err(Error::NotSupportedYet { what: "--suite xu, tan, residual, joined, scaling and all".into() });
+                return Err(Error::NotSupportedYet { what: "--suite tan, residual, joined, scaling and all".into() });
             }
         };
         let pictured = self.plots.is_some() || self.figures.is_some();
         later(pictured && suite != suites::Suite::Bagher, "--plots and --figures of a suite without errors")?;
         Ok(suites::Order {
             suite,
-            preset: match self.preset {
-                Preset::Quick => suites::Preset::Quick,
-                Preset::Full => suites::Preset::Full,
-            },
+            preset: self.preset(),
             rounds: self.rounds,
             extent: self.size,
             curves: self.plots.is_some(),
             scenes: self.scenes.clone(),
-            device: Options { device: self.device.clone(), validate: false },
+            device: self.options(),
             root: PathBuf::new(),
             cache: reference::cache_folder(),
         })
     }
 }
 
+fn later(yes: bool, what: &str) -> Result<()> {
+    if yes { Err(Error::NotSupportedYet { what: what.into() }) } else { Ok(()) }
+}
+
+/// What was asked of either kind of suite.
+enum Order {
+    Rates(suites::Order),
+    Filters(xu::Order),
+}
+
 /// Runs the subcommand.
 pub fn run(args: &Args) -> Result<ExitCode> {
-    let order = args.order()?;
+    args.check()?;
+    let order = match args.suite {
+        Suite::Xu => Order::Filters(args.filters()?),
+        _ => Order::Rates(args.order()?),
+    };
     // Before the work, not after it.
     if let Some(path) = &args.json {
         check_writable(path)?;
@@ -145,7 +187,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         Ok(())
     };
     let keep: Option<&mut suites::Keep<'_>> = if args.figures.is_some() { Some(&mut keep) } else { None };
-    let report = suites::run(&order, keep, &mut |what, done, total| {
+    let mut progress = |what: &str, done, total| {
         if bar.message() != what {
             // The time left is of each step alone.
             bar.reset_eta();
@@ -153,15 +195,27 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         }
         bar.set_length(total);
         bar.set_position(done);
-    })?;
-    bar.finish_and_clear();
-    crate::print(table::text(&report))?;
-    if let Some(folder) = &args.plots {
-        plots(folder, &report)?;
-    }
+    };
+    let json = match &order {
+        Order::Rates(order) => {
+            let report = suites::run(order, keep, &mut progress)?;
+            bar.finish_and_clear();
+            crate::print(table::text(&report))?;
+            if let Some(folder) = &args.plots {
+                plots(folder, &report)?;
+            }
+            serde_json::to_string_pretty(&report)
+        }
+        Order::Filters(order) => {
+            let report = xu::run(order, keep, &mut progress)?;
+            bar.finish_and_clear();
+            crate::print(xu_table::text(&report))?;
+            serde_json::to_string_pretty(&report)
+        }
+    };
     drawn.iter().try_for_each(|path| crate::print(format_args!("figure: {}", path.display())))?;
     if let Some(path) = &args.json {
-        let text = serde_json::to_string_pretty(&report).map_err(|e| Error::argument("--json", "numbers", e))?;
+        let text = json.map_err(|e| Error::argument("--json", "numbers", e))?;
         write_atomically(path, |file| file.write_all(text.as_bytes()))?;
     }
     Ok(ExitCode::SUCCESS)

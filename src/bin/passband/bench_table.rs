@@ -3,10 +3,12 @@
 #[path = "bench_gains.rs"]
 mod gains;
 
+pub(super) use gains::targets as aims;
+
 use comfy_table::{CellAlignment, Table, presets};
 use passband::offline::bench::cases::Half;
 use passband::offline::bench::equal::{Equal, Is};
-use passband::offline::bench::report::{Against, Gain, Report, Row, SceneReport, SpeedUp};
+use passband::offline::bench::report::{Against, Gain, Report, Row, SceneReport, Skipped, SpeedUp};
 use passband::offline::bench::statistics::{Ratio, Summary};
 
 const LEGEND: &str = "of the first's: frame time over the first variant's, with its 95 % interval
@@ -47,11 +49,14 @@ pub fn text(report: &Report) -> String {
     if !report.summary.is_empty() {
         parts.push(format!("Speed-up at equal error against full rate, over scenes\n{}", summary(&report.summary)));
     }
-    if !report.skipped.is_empty() {
-        let skipped = report.skipped.iter().map(|s| format!("  {}: scripts/fetch-assets {}", s.scene, s.needs.join(" ")));
-        parts.push(format!("Skipped, as files are missing:\n{}", skipped.collect::<Vec<_>>().join("\n")));
-    }
+    parts.extend(skipped(&report.skipped));
     parts.join("\n\n")
+}
+
+/// Scenes that lack files, if there are any.
+pub(super) fn skipped(all: &[Skipped]) -> Option<String> {
+    let lines = all.iter().map(|s| format!("  {}: scripts/fetch-assets {}", s.scene, s.needs.join(" ")));
+    (!all.is_empty()).then(|| format!("Skipped, as files are missing:\n{}", lines.collect::<Vec<_>>().join("\n")))
 }
 
 fn title(scene: &SceneReport) -> String {
@@ -60,7 +65,7 @@ fn title(scene: &SceneReport) -> String {
 }
 
 /// Columns from `left` on are numbers.
-fn aligned(header: &[&str], left: usize, rows: impl Iterator<Item = Vec<String>>) -> String {
+pub(super) fn aligned(header: &[&str], left: usize, rows: impl Iterator<Item = Vec<String>>) -> String {
     let mut table = Table::new();
     table.load_style(presets::NOTHING).set_header(header);
     table.add_rows(rows);

@@ -11,8 +11,9 @@ use passband::offline::metrics::{Exposure, encode};
 use passband::offline::render::{Settings, render};
 use passband::offline::scene::{MAX_FRAMES, Scene};
 use passband::offline::sequence::render_frames;
+use passband::offline::supersample::DEFAULT_SAMPLES;
 use passband::sampling::luminance;
-use passband::{Config, Estimator, Filter};
+use passband::{Config, Division, Estimator, Filter};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -36,7 +37,8 @@ pub struct Args {
     #[arg(long, default_value = "full")]
     rate: Rate,
     /// Directions a shaded pixel (64), their mean under a scene's settings.np_rule, and the budget that the scene asks for if not
-    /// given; with --aa at --rate bandwidth a pixel has times its samples a side as many, shared by finer ones
+    /// given; with --aa at --rate bandwidth a pixel has times its samples a side as many, shared by finer ones. With --filter
+    /// supersample, sub-samples a pixel with a position and a direction each (4096)
     #[arg(long, value_name = "N")]
     samples: Option<u32>,
     /// How directions are drawn
@@ -45,7 +47,7 @@ pub struct Args {
     /// Antialiasing samples a pixel: 1, 4 or 16
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = side)]
     aa: u32,
-    /// How materials are read at a pixel's scale
+    /// How materials are read at a pixel's scale; supersample averages points over the pixel, without any filter: the truth
     #[arg(long, default_value = "point")]
     filter: String,
     /// Probes of the bandwidth prediction (4), 1 to 256 a block of 2x2 pixels
@@ -60,7 +62,7 @@ pub struct Args {
     /// Frames A to B - 1 of an animation, to OUT.0000.exr and so on (a plain render is frame 0)
     #[arg(long, value_name = "A..B", value_parser = frames)]
     frames: Option<Range<u32>>,
-    /// A paper's own form of a step in the place of its correction, at --rate bandwidth
+    /// A paper's own form of a step in the place of its correction
     #[arg(long, value_name = "NAME")]
     literal: Vec<Literal>,
     /// Override a key of the scene: camera.fov_y=40
@@ -94,7 +96,7 @@ enum Rate {
     Oracle,
 }
 
-/// Equations of Bagher et al. 2011.
+/// Equations of Bagher et al. 2011, and all of Xu et al. 2017.
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Literal {
     /// Bandwidth as a mean that is weighted by what is reflected, but divided by the light alone
@@ -103,6 +105,9 @@ enum Literal {
     Eq8,
     /// One sample a cycle, half of what a cycle needs
     Eq9,
+    /// Xu et al. 2017 for --filter vmf1, vmf4, vmf8 and vmf: concentrations by equations 8 and 9, normals and lobes joined by 13 and
+    /// 14, cells divided by the length of their mean vectors
+    Xu,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -204,10 +209,12 @@ impl Args {
                 return Err(Error::NotSupportedYet { what: "--estimator cv and residual".into() });
             }
         };
-        if !FILTERS.contains(&self.filter.as_str()) && self.filter != "supersample" {
+        let supersample = self.filter == "supersample";
+        if !FILTERS.contains(&self.filter.as_str()) && !supersample {
             return Err(Error::argument("--filter", format!("one of {}, supersample", FILTERS.join(", ")), &self.filter));
         }
-        let filter = Filter::ALL.into_iter().find(|filter| filter.name() == self.filter);
+        let name = if supersample { Filter::Point.name() } else { &self.filter };
+        let filter = Filter::ALL.into_iter().find(|filter| filter.name() == name);
         let filter = filter.ok_or_else(|| Error::NotSupportedYet { what: format!("--filter {}", self.filter) })?;
         let literal = |form| self.literal.contains(&form);
         let config = Config {
@@ -217,7 +224,13 @@ impl Args {
             combine: if literal(Literal::Eq4) { Combine::Literal } else { base.combine },
             allocation: if literal(Literal::Eq8) { Allocation::Equation8 } else { base.allocation },
             filter,
-            directions: self.samples.unwrap_or(base.directions),
+            literal_lobes: literal(Literal::Xu),
+            division: if literal(Literal::Xu) && base.division == Division::default() {
+                Division::PRINTED
+            } else {
+                base.division
+            },
+            directions: self.samples.filter(|_| !supersample).unwrap_or(base.directions),
             estimator,
             samples_per_side: self.aa,
             ..base
@@ -227,6 +240,7 @@ impl Args {
             seed: self.seed,
             aovs: self.aov.iter().map(|name| name.parse()).collect::<Result<_>>()?,
             reference: self.reference,
+            supersample: supersample.then(|| self.samples.unwrap_or(DEFAULT_SAMPLES)),
             timed: self.stats.is_some(),
             device: Options { device: self.device.clone(), validate: self.validate },
             ..Settings::new(config)

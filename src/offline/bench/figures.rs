@@ -6,7 +6,7 @@ use crate::offline::bench::quality::{self, Frame};
 use crate::offline::bench::reference::Converged;
 use crate::offline::bench::report::SceneReport;
 use crate::offline::bench::spectrum;
-use crate::offline::bench::tiles::{KEY, Tile, covered_median, difference, heat, levels, mask, photograph};
+use crate::offline::bench::tiles::{GAIN, KEY, Tile, covered_median, difference, heat, levels, mask, photograph};
 use crate::offline::error::Result;
 use crate::offline::headless::Headless;
 use crate::offline::image_io::LinearImage;
@@ -205,7 +205,7 @@ impl Stage<'_> {
                 "Y",
                 FASTEST,
             ),
-            difference("difference, 4 times as displayed".into(), &picture(&shot.image), &truth, self.exposure()),
+            difference("difference, 4 times as displayed".into(), [&picture(&shot.image), &truth], self.exposure(), GAIN),
         ];
         let title = self.title("Figure 14: variance and bandwidth, predicted and measured");
         Ok(Figure { name: "figure-14", title, columns: 3, tiles })

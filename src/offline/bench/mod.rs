@@ -19,3 +19,4 @@ pub mod suites;
 pub mod table;
 pub mod tiles;
 pub mod variants;
+pub mod xu;

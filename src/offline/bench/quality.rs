@@ -37,10 +37,25 @@ impl Frame {
 pub struct Noise {
     /// As [`Metrics::rmse`].
     pub rmse: f64,
+    /// As [`Metrics::rel_l2`].
+    pub rel_l2: f64,
     /// As [`Metrics::relmse`].
     pub relmse: f64,
     /// As [`Metrics::psnr`].
     pub psnr: f64,
+}
+
+impl Noise {
+    /// Over some images; `None` of none.
+    pub fn mean(all: &[Self]) -> Option<Self> {
+        let mean = |of: fn(&Self) -> f64| all.iter().map(of).sum::<f64>() / all.len() as f64;
+        (!all.is_empty()).then(|| Self {
+            rmse: mean(|n| n.rmse),
+            rel_l2: mean(|n| n.rel_l2),
+            relmse: mean(|n| n.relmse),
+            psnr: mean(|n| n.psnr),
+        })
+    }
 }
 
 /// The error of `frames`, pooled, against `reference` over the pixels of `mask`.
@@ -58,8 +73,8 @@ pub fn error(frames: &[Frame], reference: &Picture, mask: &[bool]) -> Result<Met
 /// As [`error`].
 pub fn noise(halves: [&Picture; 2], mask: &[bool]) -> Result<Noise> {
     let [a, b] = halves;
-    let Metrics { rmse, relmse, psnr, .. } = compare(&[Pair { a, b, mask }], Exposure::Auto, false)?.metrics;
-    Ok(Noise { rmse: rmse / 2.0, relmse: relmse / 4.0, psnr: psnr + 20.0 * 2_f64.log10() })
+    let Metrics { rmse, rel_l2, relmse, psnr, .. } = compare(&[Pair { a, b, mask }], Exposure::Auto, false)?.metrics;
+    Ok(Noise { rmse: rmse / 2.0, rel_l2: rel_l2 / 2.0, relmse: relmse / 4.0, psnr: psnr + 20.0 * 2_f64.log10() })
 }
 
 /// The root mean squared distance of single frames from their own expectation, from pairs of them: what [`Metrics::rmse`] of

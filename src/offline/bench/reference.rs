@@ -73,10 +73,15 @@ impl Converged {
     fn new(extent: [u32; 2]) -> Self {
         let pixels = u64::from(extent[0]) * u64::from(extent[1]);
         let directions = (FRAME_BUDGET / pixels.max(1)).clamp(256, MOST_DIRECTIONS) as u32;
+        Self::of(extent, directions)
+    }
+
+    /// Without frames, which will be of `directions`.
+    pub(super) fn of(extent: [u32; 2], directions: u32) -> Self {
         Self { extent, directions, halves: Default::default(), cached: 0 }
     }
 
-    fn frames(&self) -> u32 {
+    pub(super) fn frames(&self) -> u32 {
         self.halves.iter().map(|h| h.frames).sum()
     }
 
@@ -107,13 +112,17 @@ impl Converged {
         self.image().coverage.iter().map(|a| *a > 0.0).collect()
     }
 
+    /// The means of the halves.
+    pub(super) fn halves(&self) -> [Picture; 2] {
+        self.halves.each_ref().map(|half| Frame::of(self.extent, &half.mean()).picture)
+    }
+
     /// What noise is left.
     ///
     /// # Errors
     /// Before both halves have a frame, and where no pixel is covered.
     pub fn noise(&self) -> Result<Noise> {
-        let pictures: [Picture; 2] = self.halves.each_ref().map(|half| Frame::of(self.extent, &half.mean()).picture);
-        let [a, b] = &pictures;
+        let [a, b] = &self.halves();
         quality::noise([a, b], &self.mask())
     }
 
@@ -169,29 +178,43 @@ pub fn converge(
     folder: Option<&Path>,
     progress: &mut dyn FnMut(u64, u64),
 ) -> Result<Converged> {
-    let mut image = Converged::new(base.config.extent);
+    let image = Converged::new(base.config.extent);
     let entry = folder.map(|folder| folder.join(format!("{}.reference", key(world, &base.config, &image))));
-    if let Some(known) = entry.as_ref().and_then(|entry| Converged::from_bytes(&cache::read(entry)?, &image)) {
-        image = known;
-    }
     let mut session = None;
-    let (mut saved, mut unsaved) = (Instant::now(), false);
-    while !image.is_enough(goal)? {
+    refine(image, entry.as_deref(), goal, progress, &mut |image| {
         let session = match &mut session {
             Some(session) => session,
-            none => none.insert(open(world, base, &image)?),
+            none => none.insert(open(world, base, image)?),
         };
         session.frame([SEED, image.frames()])?;
         let (bytes, ..) = session.image("resolved")?;
-        image.add(&bytemuck::pod_collect_to_vec::<u8, f32>(&bytes));
+        Ok(bytemuck::pod_collect_to_vec(&bytes))
+    })
+}
+
+/// Adds to `image`, or to what `entry` holds of it, the `R G B A` of `next` frames until `goal` is met.
+pub(super) fn refine(
+    mut image: Converged,
+    entry: Option<&Path>,
+    goal: &Goal,
+    progress: &mut dyn FnMut(u64, u64),
+    next: &mut dyn FnMut(&Converged) -> Result<Vec<f32>>,
+) -> Result<Converged> {
+    if let Some(known) = entry.and_then(|entry| Converged::from_bytes(&cache::read(entry)?, &image)) {
+        image = known;
+    }
+    let (mut saved, mut unsaved) = (Instant::now(), false);
+    while !image.is_enough(goal)? {
+        let frame = next(&image)?;
+        image.add(&frame);
         unsaved = true;
         progress(image.directions(), goal.most.max(image.directions()));
-        if let Some(entry) = entry.as_ref().filter(|_| saved.elapsed() > SAVE_EVERY) {
+        if let Some(entry) = entry.filter(|_| saved.elapsed() > SAVE_EVERY) {
             cache::keep(entry, &image.to_bytes());
             (saved, unsaved) = (Instant::now(), false);
         }
     }
-    if let Some(entry) = entry.as_ref().filter(|_| unsaved) {
+    if let Some(entry) = entry.filter(|_| unsaved) {
         cache::keep(entry, &image.to_bytes());
     }
     Ok(image)
@@ -219,7 +242,15 @@ fn open(world: &World, base: &Settings, image: &Converged) -> Result<Session> {
 }
 
 /// Hashes text as it is written.
-struct Hashed(Sha256);
+#[derive(Default)]
+pub(super) struct Hashed(Sha256);
+
+impl Hashed {
+    /// The hash so far, in letters.
+    pub fn text(self) -> String {
+        format!("{:x}", self.0.finalize())
+    }
+}
 
 impl std::fmt::Write for Hashed {
     fn write_str(&mut self, text: &str) -> std::fmt::Result {
@@ -230,11 +261,11 @@ impl std::fmt::Write for Hashed {
 
 /// The name of a world's content. Its debugging text has every number to the last bit, and whatever a world comes to hold.
 fn key(world: &World, config: &Config, image: &Converged) -> String {
-    let mut hash = Hashed(Sha256::new());
+    let mut hash = Hashed::default();
     let filter = if config.widened() { " widened" } else { "" };
     // A hash takes any text.
     let _ = write!(hash, "{VERSION} {:?} {}{filter} {world:?}", image.extent, image.directions);
-    format!("{:x}", hash.0.finalize())
+    hash.text()
 }
 
 #[cfg(test)]

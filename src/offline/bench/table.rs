@@ -155,7 +155,8 @@ pub struct Target {
 }
 
 impl Target {
-    fn new(what: String, sorted: &[(&str, SpeedUp)], found: SpeedUp, aim: f64, at_least: bool) -> Option<Self> {
+    /// Of what was found in each scene, from the least to the most, and over all of them.
+    pub(super) fn new(what: String, sorted: &[(&str, SpeedUp)], found: SpeedUp, aim: f64, at_least: bool) -> Option<Self> {
         let worst = if at_least { sorted.first() } else { sorted.last() }?.0.to_string();
         let verdict = match (found.factor >= aim, found.factor <= aim, at_least, found.is) {
             (true, _, true, Is::Found | Is::AtLeast) | (_, true, false, Is::Found | Is::AtMost) => Verdict::Passed,

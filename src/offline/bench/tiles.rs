@@ -12,8 +12,8 @@ const LEVELS: [[u8; 3]; 8] =
 pub const KEY: &str = "-2 white, -1 yellow, 0 orange, 1 red, 2 violet, 3 blue";
 /// Level of the first colour.
 const FINEST: f32 = -2.0;
-/// What differences are multiplied with.
-const GAIN: f64 = 4.0;
+/// What small differences are multiplied with.
+pub const GAIN: f64 = 4.0;
 
 /// A labelled image.
 #[derive(Clone, Debug, PartialEq)]
@@ -68,10 +68,10 @@ pub fn photograph(label: String, picture: &Picture, exposure: f64) -> Tile {
     Tile { label, width: picture.width, height: picture.height, rgb: rgb.collect() }
 }
 
-/// How far two pictures are apart as displayed, channel by channel.
-pub fn difference(label: String, a: &Picture, b: &Picture, exposure: f64) -> Tile {
+/// How far two pictures are apart as displayed, channel by channel, multiplied with `gain`.
+pub fn difference(label: String, [a, b]: [&Picture; 2], exposure: f64, gain: f64) -> Tile {
     let shown = |v: f32| encode(f64::from(v) * exposure);
-    let apart = |(a, b): (&[f32; 3], &[f32; 3])| [0, 1, 2].map(|c| byte(GAIN * (shown(a[c]) - shown(b[c])).abs()));
+    let apart = |(a, b): (&[f32; 3], &[f32; 3])| [0, 1, 2].map(|c| byte(gain * (shown(a[c]) - shown(b[c])).abs()));
     Tile { label, width: a.width, height: a.height, rgb: a.rgb.iter().zip(&b.rgb).map(apart).collect() }
 }
 

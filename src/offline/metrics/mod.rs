@@ -135,6 +135,20 @@ pub fn compare(pairs: &[Pair], exposure: Exposure, sequence: bool) -> Result<Com
     Ok(Comparison { metrics, map: display.worst })
 }
 
+/// [`Metrics::flicker`] alone; 0 for fewer than two frames.
+///
+/// # Errors
+/// As [`compare`].
+pub fn flicker(pairs: &[Pair]) -> Result<f64> {
+    let first = pairs.first().ok_or_else(|| Error::invalid("frames", "at least one", 0))?;
+    pairs.iter().enumerate().try_for_each(|(k, pair)| check(k, pair, first))?;
+    let pixels: usize = pairs.iter().map(|p| p.mask.iter().filter(|m| **m).count()).sum();
+    if pixels == 0 {
+        return Err(Error::invalid("mask", "at least one pixel above 0", "none"));
+    }
+    Ok(temporal::flicker(pairs, linear::measure(pairs, pixels).mean).unwrap_or_default())
+}
+
 fn check(k: usize, pair: &Pair, first: &Pair) -> Result<()> {
     let size = |p: &Picture| format!("{}x{}", p.width, p.height);
     for picture in [pair.a, pair.b] {

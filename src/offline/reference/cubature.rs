@@ -1,6 +1,7 @@
 //! Direct light at one point by globally adaptive quadrature.
 
-use crate::config::Filter;
+use crate::config::{Division, Filter};
+use crate::material::Sampling;
 use crate::offline::reference::environment::{Parts, Region, Tree};
 use crate::reflectance::Reflectance;
 use glam::{DMat3, DVec3};
@@ -16,13 +17,24 @@ pub struct Options {
     pub max_evaluations: u64,
     /// How materials are read. What [`Filter::Tk`] adds is a frame's own: its hits have a kernel of 0.
     pub filter: Filter,
-    /// The most look-ups along what a pixel covers of a map.
-    pub anisotropy: u32,
+    /// How maps are looked up.
+    pub sampling: Sampling,
+    /// What divides cells.
+    pub division: Division,
+    /// [`crate::Config::literal_lobes`].
+    pub literal_lobes: bool,
 }
 
 impl Default for Options {
     fn default() -> Self {
-        Self { tolerance: 1e-3, max_evaluations: 5_000_000, filter: Filter::Point, anisotropy: 1 }
+        Self {
+            tolerance: 1e-3,
+            max_evaluations: 5_000_000,
+            filter: Filter::Point,
+            sampling: Sampling::default(),
+            division: Division::default(),
+            literal_lobes: false,
+        }
     }
 }
 

@@ -69,7 +69,7 @@ impl<'a> Reference<'a> {
     /// # Errors
     /// [`Error::InvalidInput`] for an empty extent, a degenerate camera, or an index of a mesh or object out of range.
     pub fn new(world: &'a World, extent: [u32; 2], options: Options) -> Result<Self> {
-        let hits = visibility::trace(world, extent, options.filter, options.anisotropy)?;
+        let hits = visibility::trace(world, extent, &options)?;
         let environment = world.environment.as_ref().map(|light| Tree::new(&light.map));
         Ok(Self { world, extent, options, reflectances: None, hits, environment })
     }

@@ -1,9 +1,9 @@
 //! Which surface each pixel centre sees, by f64 ray-triangle intersection.
 
-use crate::config::Filter;
 use crate::error::{Error, Result};
 use crate::material::PointMaterial;
 use crate::moments::Moments;
+use crate::offline::reference::cubature::Options;
 use crate::offline::world::{Object, World};
 use glam::{DMat3, DVec2, DVec3, DVec4};
 
@@ -53,11 +53,11 @@ struct Nearest {
 
 /// Row-major hits through the pixel centres of an image of `extent` pixels. Triangles are two-sided. Each triangle is
 /// intersected with the rays of its projected bounding box, so that the cost is linear in triangles and covered pixels.
-/// Materials are read by `filter` with at most `anisotropy` look-ups.
+/// Materials are read as `options` say.
 ///
 /// # Errors
 /// [`Error::InvalidInput`] for an empty extent, a camera without a direction, or an index out of range.
-pub fn trace(world: &World, extent: [u32; 2], filter: Filter, anisotropy: u32) -> Result<Vec<Option<Hit>>> {
+pub fn trace(world: &World, extent: [u32; 2], options: &Options) -> Result<Vec<Option<Hit>>> {
     let [width, height] = extent.map(|n| n as usize);
     if width == 0 || height == 0 {
         return Err(Error::invalid("extent", "at least 1x1", format!("{width}x{height}")));
@@ -100,14 +100,15 @@ pub fn trace(world: &World, extent: [u32; 2], filter: Filter, anisotropy: u32) -
         }
     }
     let materials: Vec<_> = world.materials.iter().map(|m| m.surface()).collect();
-    let moments: Vec<_> = materials.iter().map(|m| Moments::of(m, filter)).collect();
+    let moments: Vec<_> =
+        materials.iter().map(|m| Moments::of(m, options.filter, options.division, options.literal_lobes)).collect();
     let hits = rays.iter().zip(nearest).enumerate().map(|(i, (ray, found))| {
         let found = found?;
         let object = world.objects.get(found.object)?;
         let depth = -found.distance * ray.dot(axes.z_axis);
         let (uv, footprint) = coordinates(world, extent, &found, [i % width, i / width]).unwrap_or_default();
         let point =
-            materials.get(object.material)?.filtered_at(moments.get(object.material)?.as_ref(), uv, footprint, anisotropy);
+            materials.get(object.material)?.filtered_at(moments.get(object.material)?.as_ref(), uv, footprint, options.sampling);
         let smooth = shading_normal(object, &found);
         let tangent = tangent(object, &found, smooth);
         let mapped = tangent.map_or(smooth, |(t, side)| {

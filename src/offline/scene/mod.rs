@@ -1,12 +1,13 @@
 //! Scene files: TOML in, a resolved [`World`] out.
 
+use crate::config::PRINTED_LENGTHS;
 use crate::frequency::allocation::Allocation;
 use crate::frequency::operators::{Combine, Operator};
 use crate::offline::animation::AnimatedWorld;
 use crate::offline::error::{At, Error, Result};
 use crate::offline::input;
 use crate::offline::world::World;
-use crate::{Bins, Config};
+use crate::{Bins, Config, Division};
 use builtins::BUILTINS;
 use std::path::{Path, PathBuf};
 
@@ -15,12 +16,12 @@ mod bakes;
 mod builtins;
 mod check;
 mod format;
-mod later;
 mod lights;
 mod maps;
 mod materials;
 mod overrides;
 mod resolve;
+mod settings;
 mod source;
 
 pub use animation::MAX_FRAMES;
@@ -44,8 +45,7 @@ impl Scene {
     ///
     /// # Errors
     /// [`Error::File`] with the line of whatever is unknown, missing, of another type or out of range;
-    /// [`Error::Argument`] if an override brought it, or for a name that is neither; [`Error::NotSupportedYet`] for keys
-    /// that are right but beyond this version.
+    /// [`Error::Argument`] if an override brought it, or for a name that is neither.
     pub fn load(scene: &str, overrides: &[(String, String)]) -> Result<Self> {
         if let Some((name, text)) = BUILTINS.iter().find(|(name, _)| *name == scene) {
             return Self::parse(name, PathBuf::from(format!("<{name}>")), PathBuf::new(), text.to_string(), overrides);
@@ -112,6 +112,12 @@ impl Scene {
             bins: match settings.bins.as_ref().map(|v| v.get_ref().as_str()) {
                 Some("camera") => Bins::Camera,
                 _ => base.bins,
+            },
+            anisotropy: settings.anisotropy.as_ref().map_or(base.anisotropy, |v| *v.get_ref() as u32),
+            lod_bias: settings.lod_bias.as_ref().map_or(base.lod_bias, |v| *v.get_ref() as f32),
+            division: match [&settings.eps0, &settings.eps1].map(|eps| eps.as_ref().map(|v| *v.get_ref())) {
+                [None, None] => base.division,
+                [one, quarters] => Division::Lengths([one.unwrap_or(PRINTED_LENGTHS[0]), quarters.unwrap_or(PRINTED_LENGTHS[1])]),
             },
             geometric: settings.geometric.as_ref().map_or(base.geometric, |v| *v.get_ref()),
             directions: settings.budget.as_ref().map_or(base.directions, |v| *v.get_ref()),

@@ -1,0 +1,216 @@
+//! The suite xu: every filter against the truth, under a point light and under an environment, and what each costs (Xu et al.
+//! 2017, table 1, figures 1, 2 and 4 to 6).
+
+mod aims;
+pub mod cases;
+pub mod motion;
+pub mod report;
+mod stills;
+mod strips;
+mod times;
+mod truths;
+
+use crate::offline::bench::reference::Goal;
+use crate::offline::bench::report::Seconds;
+use crate::offline::bench::suites::{Keep, Preset, Progress};
+use crate::offline::cache;
+use crate::offline::error::{Error, Result};
+use crate::offline::headless::{Headless, Options};
+use crate::offline::scene::Scene;
+use crate::offline::session::Session;
+use crate::offline::supersample;
+use crate::offline::world::World;
+use crate::{Config, Estimator, Filter, Requirements};
+use cases::Light;
+use report::{Report, Row, SceneReport, TruthReport};
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+use truths::Truths;
+
+/// What to run.
+#[derive(Clone, Debug)]
+pub struct Order {
+    /// How much of it.
+    pub preset: Preset,
+    /// Timed frames of each filter; the preset's without.
+    pub rounds: Option<u32>,
+    /// Size of stills; the preset's without.
+    pub extent: Option<[u32; 2]>,
+    /// Scene files or built-in names in the place of the suite's own.
+    pub scenes: Vec<String>,
+    /// Device.
+    pub device: Options,
+    /// The repository, under which scene files and fetched files are.
+    pub root: PathBuf,
+    /// Where truths are kept.
+    pub cache: Option<PathBuf>,
+}
+
+impl Preset {
+    /// Of stills.
+    fn still(self) -> [u32; 2] {
+        match self {
+            Self::Quick => [128; 2],
+            Self::Full => [256; 2],
+        }
+    }
+
+    /// Joint sub-samples of a still's truth at which it ends in any case.
+    fn most_samples(self) -> u32 {
+        match self {
+            Self::Quick => supersample::DEFAULT_SAMPLES,
+            Self::Full => 4 * supersample::DEFAULT_SAMPLES,
+        }
+    }
+
+    fn frames_timed(self) -> u32 {
+        match self {
+            Self::Quick => 3,
+            Self::Full => 7,
+        }
+    }
+}
+
+/// The folder of the user's cache in which truths are kept; `None` on systems that have none.
+pub fn cache_folder() -> Option<PathBuf> {
+    cache::folder("truth")
+}
+
+/// The error that a truth's noise has to be below is the smallest over this.
+const MARGIN: f64 = 10.0;
+
+/// Runs the suite. `keep` is given a strip of images of each scene and light; without, none are drawn.
+///
+/// # Errors
+/// Of the scenes, the device or the driver, and of `keep`. What a filter refuses is an empty row.
+pub fn run(order: &Order, mut keep: Option<&mut Keep<'_>>, progress: &mut Progress<'_>) -> Result<Report> {
+    let clock = Instant::now();
+    let mut report = Report {
+        schema: 1,
+        passband: env!("CARGO_PKG_VERSION"),
+        suite: "xu",
+        preset: order.preset.name(),
+        rounds: order.rounds.unwrap_or(order.preset.frames_timed()),
+        device: None,
+        scenes: Vec::new(),
+        skipped: Vec::new(),
+        targets: Vec::new(),
+        seconds: Seconds::default(),
+    };
+    // A name that is none is known before the work begins.
+    let own = order.scenes.iter().map(|name| Scene::load(name, &[])).collect::<Result<Vec<_>>>()?;
+    let scenes = if own.is_empty() { cases::scenes(order, &mut report.skipped)? } else { own };
+    for scene in scenes {
+        progress(&format!("{}: loading", scene.name()), 0, 1);
+        let world = scene.resolve()?;
+        let config = scene.config(order.extent.unwrap_or(order.preset.still()));
+        for light in Light::ALL {
+            let stage = Stage { order, light, world: light.alone_in(&world)?, config: &config, rounds: report.rounds };
+            let found = stage.measure(&mut report, &mut keep, progress)?;
+            report.scenes.push(found);
+        }
+    }
+    report.targets = aims::targets(&report.scenes);
+    report.seconds.total = clock.elapsed().as_secs_f64();
+    Ok(report)
+}
+
+/// One scene under one light.
+struct Stage<'a> {
+    order: &'a Order,
+    light: Light,
+    world: World,
+    /// The scene's own settings.
+    config: &'a Config,
+    rounds: u32,
+}
+
+impl Stage<'_> {
+    fn device(&self) -> &Options {
+        &self.order.device
+    }
+
+    /// Frames that are waited for one by one. Under a point light, where shading is exact, one direction finds nothing.
+    fn config(&self, filter: Filter, extent: [u32; 2], directions: u32) -> Config {
+        let (estimator, directions) = match self.light {
+            Light::Point => (Estimator::Brdf, 1),
+            Light::Environment => (Estimator::Mis, directions),
+        };
+        Config { frames_in_flight: 1, filter, extent, estimator, directions, ..self.config.clone() }
+    }
+
+    fn measure(&self, report: &mut Report, keep: &mut Option<&mut Keep<'_>>, progress: &mut Progress<'_>) -> Result<SceneReport> {
+        let name = format!("{}, {}", self.world.name, self.light.name());
+        let mut told = |what: &str, done, total| progress(&format!("{name}: {what}"), done, total);
+        let extent = self.config.extent;
+        let mut rows: Vec<Row> = Filter::ALL.into_iter().map(Row::new).collect();
+        let cache = self.order.cache.as_deref();
+
+        let clock = Instant::now();
+        let first = supersample::DEFAULT_SAMPLES.into();
+        let mut truths = Truths::new(&self.world, self.device(), cache, supersample::DEFAULT_SAMPLES / 2);
+        let mut truth = truths.of(&self.world.camera, extent, &Goal { noise: 0.0, most: first }, &mut |done, total| {
+            told("truth", done, total);
+        })?;
+        report.seconds.references += clock.elapsed().as_secs_f64();
+
+        let mut stills = stills::take(self, &truth, &mut rows, &mut |done, total| told("images", done, total))?;
+        let clock = Instant::now();
+        let smallest = rows.iter().filter_map(|r| r.errors.as_ref()).map(|e| e.rmse).fold(f64::INFINITY, f64::min);
+        let goal = Goal { noise: smallest / MARGIN, most: self.order.preset.most_samples().into() };
+        if truth.noise()?.rmse > goal.noise && truth.directions() < goal.most {
+            truth = truths.of(&self.world.camera, extent, &goal, &mut |done, total| told("truth", done, total))?;
+            stills::judge(&mut stills, &truth, &mut rows)?;
+        }
+        report.seconds.references += clock.elapsed().as_secs_f64();
+        let noise = truth.noise()?;
+        let smallest = rows.iter().filter_map(|r| r.errors.as_ref()).map(|e| e.rmse).fold(f64::INFINITY, f64::min);
+
+        let flicker_noise = match self.order.preset {
+            Preset::Quick => None,
+            Preset::Full => Some(motion::flicker(self, &mut rows, report, &mut told)?),
+        };
+        let cost = times::measure(self, &mut rows, &mut |done, total| told("frames", done, total))?;
+        if let Some(keep) = keep.as_mut() {
+            keep(&self.world.name, strips::strip(self, &truth, &stills, &rows))?;
+        }
+        report.device.get_or_insert(cost.device);
+        Ok(SceneReport {
+            scene: self.world.name.clone(),
+            light: self.light,
+            extent,
+            truth: TruthReport {
+                samples: truth.directions(),
+                cached: truth.cached,
+                noise,
+                pixels: stills::mask(&truth).iter().filter(|m| **m).count(),
+                margin: smallest / noise.rmse,
+            },
+            flicker_noise,
+            texels: cost.texels,
+            estimator: cost.estimator,
+            supersampling: cost.supersampling,
+            order: report::order(&rows),
+            rows,
+        })
+    }
+}
+
+/// A session of `config`, or why there is none: what a filter or an estimator refuses is no error of the suite.
+fn open(world: &World, config: &Config, device: &Options) -> Result<std::result::Result<Session, String>> {
+    match Session::new(Headless::new(device, &Requirements::of(config))?, world, config) {
+        Ok(session) => Ok(Ok(session)),
+        Err(e) if e.exit_code() == 2 => Ok(Err(e.to_string())),
+        Err(e) => Err(e),
+    }
+}
+
+/// `path` under `root`, as the user's system writes it.
+fn under(root: &Path, path: &str) -> String {
+    root.join(path).to_string_lossy().into_owned()
+}
+
+/// Numbers that JSON cannot hold are an error of the device's frames, not of the report.
+fn finite(value: f64, what: &str) -> Result<f64> {
+    if value.is_finite() { Ok(value) } else { Err(Error::Device(format!("{what} is {value}"))) }
+}

@@ -1,0 +1,179 @@
+//! What the suite found: the `--json` file, schema 1.
+
+use crate::Filter;
+use crate::offline::bench::quality::Noise;
+use crate::offline::bench::report::{Seconds, Skipped};
+use crate::offline::bench::statistics::{Ratio, Summary};
+use crate::offline::bench::table::Target;
+use crate::offline::bench::xu::cases::Light;
+use crate::offline::headless::DeviceInfo;
+use crate::offline::metrics::Metrics;
+use serde::Serialize;
+
+/// A whole run.
+#[derive(Clone, Debug, Serialize)]
+pub struct Report {
+    /// Version of this layout.
+    pub schema: u32,
+    /// Version of the program.
+    pub passband: &'static str,
+    /// Name of the suite.
+    pub suite: &'static str,
+    /// Name of the preset.
+    pub preset: &'static str,
+    /// Timed frames of each filter.
+    pub rounds: u32,
+    /// The device; absent if every scene was skipped.
+    pub device: Option<DeviceInfo>,
+    /// Each scene under a point light, then under its environment.
+    pub scenes: Vec<SceneReport>,
+    /// Scenes that lack files.
+    pub skipped: Vec<Skipped>,
+    /// What was aimed at, as far as it was measured.
+    pub targets: Vec<Target>,
+    /// Wall times of the run; `references` are truths.
+    pub seconds: Seconds,
+}
+
+/// One scene under one light.
+#[derive(Clone, Debug, Serialize)]
+pub struct SceneReport {
+    /// The scene file's stem or the built-in's name.
+    pub scene: String,
+    /// What shines.
+    pub light: Light,
+    /// Pixels of stills.
+    pub extent: [u32; 2],
+    /// What errors are against.
+    pub truth: TruthReport,
+    /// The flicker that the noise of truths alone would make, of the full preset.
+    pub flicker_noise: Option<Flicker>,
+    /// Of the base levels of all different pairs of a map of normals and one of roughness.
+    pub texels: u64,
+    /// With which frames are timed: `preconvolved`, or `mis` where a material refuses that.
+    pub estimator: &'static str,
+    /// One point-filtered frame of eight times as many pixels a side, which is 64 samples a pixel of the same shading.
+    pub supersampling: Cost,
+    /// Filters from the smallest error to the largest, by [`Errors::less_noise`].
+    pub order: Vec<&'static str>,
+    /// Every filter.
+    pub rows: Vec<Row>,
+}
+
+/// A supersampled image.
+#[derive(Clone, Debug, Serialize)]
+pub struct TruthReport {
+    /// Joint sub-samples a pixel.
+    pub samples: u64,
+    /// How many of them came from the cache.
+    pub cached: u64,
+    /// Its own noise, over all pixels in which something is seen.
+    pub noise: Noise,
+    /// Pixels that are judged: those that surfaces cover wholly.
+    pub pixels: usize,
+    /// The smallest error that was judged by it, over its noise (root mean squares): 10 or more is good.
+    pub margin: f64,
+}
+
+/// One filter.
+#[derive(Clone, Debug, Serialize)]
+pub struct Row {
+    /// As `--filter` names it.
+    pub filter: &'static str,
+    /// Why there is nothing, if the filter does not take a material.
+    pub refused: Option<String>,
+    /// Of a still whose own noise is a small part of them; under an environment by sampling.
+    pub errors: Option<Errors>,
+    /// Of a still with the estimator preconvolved, under an environment, where no material refuses that.
+    pub preconvolved: Option<Errors>,
+    /// In the full preset.
+    pub flicker: Option<Flicker>,
+    /// Lobes of a covered pixel in the mean, where the filter says it.
+    pub lobes: Option<f64>,
+    /// What it costs.
+    pub cost: Option<Cost>,
+}
+
+/// How far a still is from the truth.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Errors {
+    /// As [`Metrics::rmse`].
+    pub rmse: f64,
+    /// As [`Metrics::rel_l2`].
+    pub rel_l2: f64,
+    /// As [`Metrics::color_error`].
+    pub color_error: f64,
+    /// As [`Metrics::psnr`].
+    pub psnr: f64,
+    /// As [`Metrics::flip`].
+    pub flip: f64,
+    /// Mean radiance over the truth's, over all channels: 1 where no energy is lost or won.
+    pub energy: f64,
+    /// Directions a pixel; 0 where none are drawn.
+    pub directions: u32,
+    /// The still's own noise, as [`Metrics::rel_l2`].
+    pub noise: f64,
+    /// `rel_l2` without what the noise of still and truth adds to it in the mean: these are independent, so squares add up.
+    pub less_noise: f64,
+}
+
+/// As [`Metrics::flicker`], over [`FRAMES`](super::motion::FRAMES) frames against as many truths.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Flicker {
+    /// The eye moves away from its target.
+    pub zoom: f64,
+    /// The eye turns about it.
+    pub orbit: f64,
+}
+
+/// Milliseconds on the device.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Cost {
+    /// `brdf_map` and `vmf_mips`, on change; absent without maps of the filter's own.
+    pub set_up_ms: Option<Summary>,
+    /// `filter` and `base` (or `shade`), in every frame.
+    pub shade_ms: Summary,
+    /// All passes of a frame.
+    pub frame_ms: Summary,
+    /// 64x supersampling's `shade_ms` over this.
+    pub gain: Option<Ratio>,
+    /// 64x supersampling's `shade_ms` over this and set-up.
+    pub gain_with_set_up: Option<Ratio>,
+    /// `shade_ms` over LEAN mapping's.
+    pub over_lean: Option<Ratio>,
+    /// Set-up a texel, in nanoseconds.
+    pub ns_a_texel: Option<f64>,
+    /// Device memory of the materials beyond that with the filter `point`, a texel, mips included.
+    pub bytes_a_texel: Option<f64>,
+}
+
+impl Row {
+    /// Of which nothing is known yet.
+    pub(super) fn new(filter: Filter) -> Self {
+        let filter = filter.name();
+        Self { filter, refused: None, errors: None, preconvolved: None, flicker: None, lobes: None, cost: None }
+    }
+}
+
+impl Errors {
+    /// Of a still with this noise; `truth` is the truth's, over the same pixels.
+    pub(super) fn new(metrics: &Metrics, energy: f64, directions: u32, [noise, truth]: [f64; 2]) -> Self {
+        let Metrics { rmse, rel_l2, color_error, psnr, flip, .. } = *metrics;
+        let less_noise = (rel_l2 * rel_l2 - noise * noise - truth * truth).max(0.0).sqrt();
+        Self { rmse, rel_l2, color_error, psnr, flip, energy, directions, noise, less_noise }
+    }
+}
+
+impl SceneReport {
+    /// The filter of that name.
+    pub fn row(&self, filter: &str) -> Option<&Row> {
+        self.rows.iter().find(|row| row.filter == filter)
+    }
+}
+
+/// Names of filters, the best first.
+pub(super) fn order(rows: &[Row]) -> Vec<&'static str> {
+    let mut known: Vec<_> = rows.iter().filter_map(|row| Some((row.errors.as_ref()?.less_noise, row.filter))).collect();
+    known.sort_by(|a, b| a.0.total_cmp(&b.0));
+    known.into_iter().map(|(_, filter)| filter).collect()
+}

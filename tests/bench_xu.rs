@@ -1,0 +1,183 @@
+//! `passband bench --suite xu` as users call it: small scenes, all of what it writes.
+
+mod support {
+    pub mod bench;
+}
+
+use passband::Filter;
+use passband::offline::image_io::write_png;
+use serde_json::{Value, json};
+use support::bench::{Folder, number};
+
+/// Bumps, of which a pixel has several; the reflectance stands where it says so.
+const SCENE: &str = r#"
+[camera]
+position = [0, 1, 1.19]
+fov_y = 40
+[environment]
+builtin = "studio"
+[[lights]]
+type = "point"
+position = [0.4, 1.1, -1]
+intensity = 2
+[[objects]]
+builtin = "plane"
+material = "surface"
+scale = 1.7
+[materials.surface]
+reflectance = REFLECTANCE
+normal_map = "bumps.png"
+tiling = [24, 24]
+"#;
+
+/// Texels a side of the bumps.
+const SIDE: u32 = 32;
+
+/// Writes the scene `name` and its map into `folder`.
+fn write(folder: &Folder, name: &str, reflectance: &str) {
+    std::fs::write(folder.0.join(name), SCENE.replace("REFLECTANCE", reflectance)).unwrap();
+    let texel = |i: u32| {
+        let [x, y] = [i % SIDE, i / SIDE].map(|i| (i as f32 + 0.5) / SIDE as f32 * 2.0 - 1.0);
+        // A dome over most of each tile.
+        let (x, y) = if x.hypot(y) < 0.9 { (0.7 * x, -0.7 * y) } else { (0.0, 0.0) };
+        let z = (1.0 - x * x - y * y).sqrt();
+        [x, y, z].map(|c| (127.5 * (c + 1.0)).round() as u8).into_iter().chain([255])
+    };
+    let texels: Vec<u8> = (0..SIDE * SIDE).flat_map(texel).collect();
+    write_png(&folder.0.join("bumps.png"), SIDE, SIDE, &texels).unwrap();
+}
+
+/// The scene under one light.
+fn under<'a>(report: &'a Value, light: &str) -> &'a Value {
+    report["scenes"].as_array().unwrap().iter().find(|s| s["light"] == light).unwrap_or_else(|| panic!("not under {light}"))
+}
+
+fn row<'a>(scene: &'a Value, filter: &str) -> &'a Value {
+    scene["rows"].as_array().unwrap().iter().find(|r| r["filter"] == filter).unwrap_or_else(|| panic!("no {filter}"))
+}
+
+#[test]
+fn filters_are_compared_with_the_truth() {
+    let folder = Folder::new("xu");
+    let reflectance = "{ vmf = [{ mu = [0, 0, 1], kappa = 128, weight = 0.5 }] }";
+    write(&folder, "small.toml", reflectance);
+    let args = ["small.toml", "--suite", "xu", "--size", "24x20", "--rounds", "2"];
+    let (text, report) = folder.json(&[&args[..], &["--figures", "strips"]].concat());
+    assert_eq!((&report["schema"], &report["suite"], &report["rounds"]), (&1.into(), &"xu".into(), &2.into()));
+    assert!(report["device"]["name"].as_str().unwrap().contains("llvmpipe"));
+    assert_eq!(report["scenes"].as_array().unwrap().len(), 2);
+    let filters: Vec<_> = Filter::ALL.iter().map(|f| json!(f.name())).collect();
+    for light in ["point", "environment"] {
+        let scene = under(&report, light);
+        assert_eq!(
+            (&scene["scene"], &scene["extent"], &scene["estimator"]),
+            (&json!("small"), &json!([24, 20]), &json!("preconvolved"))
+        );
+        let rows = scene["rows"].as_array().unwrap();
+        assert_eq!(rows.iter().map(|r| r["filter"].clone()).collect::<Vec<_>>(), filters);
+        let truth = &scene["truth"];
+        assert!(truth["samples"] == 4096 && truth["cached"] == 0 && number(&truth["pixels"]) > 300.0, "{truth}");
+        let error = |filter: &str| number(&row(scene, filter)["errors"]["rel_l2"]);
+        println!(
+            "{light}: {}",
+            filters.iter().map(|f| format!("{f} {:.3}", error(f.as_str().unwrap()))).collect::<Vec<_>>().join(", ")
+        );
+        assert!(error("vmf1") < 0.9 * error("point") && error("toksvig") < 0.9 * error("point"), "{scene}");
+        assert!(number(&truth["noise"]["rel_l2"]) < 0.3 * error("vmf1"), "{truth}");
+        let ranked = |f: &Value| number(&row(scene, f.as_str().unwrap())["errors"]["less_noise"]);
+        let order: Vec<_> = scene["order"].as_array().unwrap().iter().map(ranked).collect();
+        assert!(order.is_sorted() && order.len() == filters.len());
+        for row in rows {
+            check_row(row, light, number(&scene["texels"]));
+        }
+        let finer = number(&scene["supersampling"]["shade_ms"]["median"]);
+        let ratio = finer / number(&row(scene, "vmf1")["cost"]["shade_ms"]["median"]);
+        assert!((number(&row(scene, "vmf1")["cost"]["gain"]["ratio"]) / ratio - 1.0).abs() < 1e-9 && ratio > 1.0);
+        let strip = format!("small-{light}.png");
+        assert!(folder.0.join("strips").join(&strip).metadata().unwrap().len() > 10_000 && text.contains(&strip), "{text}");
+    }
+    assert_eq!(number(&under(&report, "point")["texels"]), f64::from(SIDE * SIDE));
+    let target = report["targets"].as_array().unwrap().iter().find(|t| t["what"].as_str().unwrap().contains("vmf8"));
+    assert!(target.is_none(), "aims are of the suite's own scenes: {target:?}");
+    for what in ["small, point, 24x20", "Costs on the device", "from best to worst", "toksvig", "64x over shading"] {
+        assert!(text.contains(what), "{what} is not in\n{text}");
+    }
+
+    // The second run finds the truths, and finds the same.
+    assert_eq!(folder.kept("truth").len(), 2);
+    let (_, again) = folder.json(&[&args[..5], &["--rounds", "1"]].concat());
+    for light in ["point", "environment"] {
+        let (scene, former) = (under(&again, light), under(&report, light));
+        assert_eq!(scene["truth"]["cached"], former["truth"]["samples"]);
+        for filter in Filter::ALL.map(Filter::name) {
+            let both = [scene, former].map(|scene| row(scene, filter));
+            assert_eq!(
+                (&both[0]["errors"], &both[0]["preconvolved"]),
+                (&both[1]["errors"], &both[1]["preconvolved"]),
+                "{filter}"
+            );
+        }
+    }
+}
+
+fn check_row(row: &Value, light: &str, texels: f64) {
+    assert!(row["refused"].is_null() && row["flicker"].is_null(), "{row}");
+    let (errors, cost) = (&row["errors"], &row["cost"]);
+    let all = ["rmse", "rel_l2", "color_error", "psnr", "flip", "energy"].map(|name| number(&errors[name]));
+    assert!(all.iter().all(|v| *v > 0.0), "{errors}");
+    let noise = number(&errors["noise"]);
+    if light == "point" {
+        assert!(errors["directions"] == 0 && noise == 0.0 && row["preconvolved"].is_null(), "{row}");
+    } else {
+        assert!(number(&errors["directions"]) >= 512.0 && noise < 0.15 * number(&errors["rel_l2"]), "{row}");
+        let ratio = number(&row["preconvolved"]["rel_l2"]) / number(&errors["rel_l2"]);
+        assert!((0.5..2.0).contains(&ratio), "{row}");
+    }
+    let (shade, frame) = (number(&cost["shade_ms"]["median"]), number(&cost["frame_ms"]["median"]));
+    assert!(0.0 < shade && shade < frame && number(&cost["gain"]["ratio"]) > 0.0, "{cost}");
+    let stored = Filter::ALL.into_iter().any(|f| row["filter"] == f.name() && f.stored().is_some());
+    assert_eq!(stored, !cost["set_up_ms"].is_null(), "{cost}");
+    if stored {
+        let set_up = number(&cost["set_up_ms"]["median"]);
+        assert!((number(&cost["ns_a_texel"]) / (set_up * 1e6 / texels) - 1.0).abs() < 1e-9, "{cost}");
+        // At least four components of 16 bits, and all mips of them.
+        assert!(number(&cost["bytes_a_texel"]) > 8.0 * 1.33, "{cost}");
+        assert!(number(&cost["gain_with_set_up"]["ratio"]) < number(&cost["gain"]["ratio"]), "{cost}");
+    }
+}
+
+#[test]
+fn what_an_estimator_refuses_is_left_empty_and_motion_is_of_the_full_preset() {
+    let folder = Folder::new("xu-full");
+    write(&folder, "table.toml", "{ builtin = \"metallic-paint\" }");
+    let (text, report) = folder.json(&["table.toml", "--suite", "xu", "--size", "12x12", "--rounds", "1", "--preset", "full"]);
+    for light in ["point", "environment"] {
+        let scene = under(&report, light);
+        assert_eq!(scene["estimator"], "mis");
+        assert!(number(&scene["flicker_noise"]["zoom"]) < 0.3 && number(&scene["flicker_noise"]["orbit"]) < 0.3, "{scene}");
+        for filter in Filter::ALL.map(Filter::name) {
+            let row = row(scene, filter);
+            if !row["refused"].is_null() {
+                assert!(row["errors"].is_null() && text.contains(row["refused"].as_str().unwrap()), "{row}");
+                continue;
+            }
+            assert!(row["preconvolved"].is_null() && number(&row["errors"]["rel_l2"]) > 0.0, "{row}");
+            assert!(number(&row["flicker"]["zoom"]) > 0.0 && number(&row["flicker"]["orbit"]) > 0.0, "{row}");
+        }
+        let flicker = |filter: &str| number(&row(scene, filter)["flicker"]["zoom"]);
+        assert!(flicker("vmf1") < 0.8 * flicker("point"), "{light}: {} {}", flicker("vmf1"), flicker("point"));
+    }
+    // A still and two motions of 16 frames, under two lights.
+    assert_eq!(folder.kept("truth").len(), 2 * (1 + 2 * 16));
+}
+
+#[test]
+fn what_the_suite_cannot_do_is_one_line() {
+    let folder = Folder::new("xu-refused");
+    for (args, part) in [(["--plots", "plots"], "--plots"), (["--report", "out.html"], "--report")] {
+        let output = folder.run(&[&["--suite", "xu"], &args[..]].concat());
+        let said = String::from_utf8(output.stderr).unwrap();
+        assert_eq!((output.status.code(), said.lines().count()), (Some(2), 1), "{said}");
+        assert!(said.contains("not supported yet") && said.contains(part), "{said}");
+    }
+}
