@@ -73,11 +73,11 @@ fn render(session: &mut Session) -> Vec<DVec3> {
     texels.into_iter().map(|[r, g, b, _]| DVec3::new(r.into(), g.into(), b.into())).collect()
 }
 
-/// The largest difference of two images over the mean of the second.
+/// The largest difference of two images, over the second or, where this is less, its mean.
 fn apart(image: &[DVec3], expected: &[DVec3]) -> f64 {
     let mean = expected.iter().map(|c| c.x).sum::<f64>() / expected.len() as f64;
     assert!(mean > 1e-3, "the scene is dark");
-    image.iter().zip(expected).map(|(a, b)| (a - b).abs().max_element()).fold(0.0, f64::max) / mean
+    image.iter().zip(expected).map(|(a, b)| ((a - b).abs() / b.max(DVec3::splat(mean))).max_element()).fold(0.0, f64::max)
 }
 
 /// A texel's frame as `texture_space.frag` writes it: world from tangent; none where nothing is seen.
@@ -222,10 +222,10 @@ fn frames_are_the_surfaces_and_weights_its_coverage() {
     for i in 0..32 * 32 {
         let at = 2 * (i / 32) * 64 + 2 * (i % 32);
         let expected = (covered(at) + covered(at + 1) + covered(at + 64) + covered(at + 65)) / 4.0;
-        assert!((whole(&cells, 0, i).1 - expected).abs() < 1e-6);
+        assert!((whole(&cells[..8], 0, i).1 - expected).abs() < 1e-6);
     }
     let share = (0..64 * 64).map(covered).sum::<f64>() / 4096.0;
-    assert!((whole(&cells, 5, 0).1 - share).abs() < 1e-6);
+    assert!((whole(&cells[..8], 5, 0).1 - share).abs() < 1e-6);
 }
 
 /// Plane under these maps; its normal, direction of growing u and of growing v are +Y, +X, -Z.
@@ -291,7 +291,7 @@ fn where_both_frames_are_one_so_are_the_images() {
                         [Bins::Tangent, Bins::Camera].map(|bins| render(&mut open(&world, &with(bins, filter, 48)).unwrap()));
                     let off = apart(&camera, &tangent);
                     println!("{name} {} roll {roll} side {side}: {off:.1e}", filter.name());
-                    // A turn of a quarter puts lobes that are half way between x and y to the other side.
+                    // What is found is kept in 16 bits, of which one is 5e-4 of a lobe's weight and concentration.
                     assert!(off < 2e-3, "{name} {} roll {roll} side {side}: {off:e}", filter.name());
                 }
             }
