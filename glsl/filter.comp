@@ -34,6 +34,8 @@ layout(constant_id = 10) const float LOD_BIAS = 0.0;
 layout(constant_id = 11) const bool LITERAL = false;
 layout(constant_id = 12) const float LENGTH_OF_ONE = 0.0;
 layout(constant_id = 13) const float LENGTH_OF_QUARTERS = 0.0;
+// Whether cells are in camera space, each object's own.
+layout(constant_id = 14) const bool CAMERA = false;
 
 struct MapRecord {
     uvec4 places;        // albedo, specular, normal, roughness: 0 for none, else (layer << 3 | class) + 1
@@ -63,6 +65,9 @@ layout(set = 2, binding = 9) uniform sampler2DArray textures_7;
 layout(set = 2, binding = 10, rgba32f) uniform writeonly image2D normals;   // shading normal; tangent as tangent.glsl encodes it
 layout(set = 2, binding = 11, rgba32ui) uniform writeonly uimage2D factors; // as factors.glsl packs them
 layout(set = 2, binding = 12, rgba32ui) uniform writeonly uimage2DArray lobes; // as found.glsl packs them
+layout(set = 2, binding = 13, std430) readonly buffer Objects {
+    uint objects[]; // in camera space, by object: its cells, as `MapRecord::cells`
+};
 
 // What a pixel covers of a map: look-ups along the longer axis, at a level whose texels are as large as the step from one to the
 // next; with one look-up, as large as the longer axis.
@@ -170,7 +175,7 @@ float geometric_kernel(ivec2 p, vec3 n) {
 
 // A sample's lobes as they are found.
 struct Found {
-    mat3 frame;      // world from tangent frame
+    mat3 frame;      // world from the frame of what is found: the tangent frame, or the camera's for its cells
     float kernel;    // what widens them
     uint count;
     float sharpest;  // concentration of those that matter
@@ -243,8 +248,9 @@ Cell both(Cell a, Cell b) {
     return Cell(a.sum + b.sum, a.spread + b.spread, a.normal + b.normal);
 }
 
-// The cells of what a pixel covers: between base texels, which have their lobes as they are, and the levels of cells.
-void gather(MapRecord record, vec2 uv, Reach r, uint lobe_layer, out Cell cells[CELLS]) {
+// The cells of what a pixel covers: between base texels, which have their lobes as they are, and the levels of cells. `turn` is
+// the cells' frame from the pixel's tangent frame, where these differ.
+void gather(MapRecord record, uint code, mat3 turn, vec2 uv, Reach r, uint lobe_layer, out Cell cells[CELLS]) {
     for (uint i = 0u; i < CELLS; ++i) {
         cells[i] = Cell(vec4(0.0), 0.0, vec3(0.0));
     }
@@ -253,17 +259,34 @@ void gather(MapRecord record, vec2 uv, Reach r, uint lobe_layer, out Cell cells[
         vec2 at = reach_tap(r, uv, tap);
         float share = coarse / r.taps;
         for (uint i = 0u; i < filter_cells(FILTER); ++i) {
-            cells[i].sum += fetch(CELL_CLASSES, record.cells, i, at, level) * share;
+            cells[i].sum += fetch(CELL_CLASSES, code, i, at, level) * share;
         }
         for (uint i = 0u; i < filter_cells(FILTER); i += 4u) {
-            vec4 four = fetch(CELL_CLASSES, record.cells, filter_cells(FILTER) + i / 4u, at, level) * share;
+            vec4 four = fetch(CELL_CLASSES, code, filter_cells(FILTER) + i / 4u, at, level) * share;
             for (uint k = 0u; k < 4u; ++k) {
                 cells[i + k].spread += four[k];
             }
         }
         for (uint i = 0u; i < (record.upright != 0u ? 0u : filter_cells(FILTER)); ++i) {
-            cells[i].normal += fetch(CELL_CLASSES, record.cells, filter_normals(FILTER) + i, at, level).xyz * share;
+            cells[i].normal += fetch(CELL_CLASSES, code, filter_normals(FILTER) + i, at, level).xyz * share;
         }
+    }
+    if (CAMERA) {
+        // What texels without a frame lack; where all do, the base texels stand for all.
+        float covered = 0.0;
+        for (uint i = 0u; i < CELLS; ++i) {
+            covered += cells[i].sum.w;
+        }
+        float factor = covered > LEAST_WEIGHT ? coarse / covered : 0.0;
+        for (uint i = 0u; i < CELLS; ++i) {
+            cells[i].sum *= factor;
+            cells[i].spread *= factor;
+            cells[i].normal *= factor;
+        }
+        coarse = factor > 0.0 ? coarse : 0.0;
+    }
+    for (float tap = 0.0; tap < r.taps; ++tap) {
+        vec2 at = reach_tap(r, uv, tap);
         vec2 place = vec2(at.x, 1.0 - at.y) * r.size - 0.5, first = floor(place), part = place - first;
         // Base texels, where they count.
         for (uint k = 0u; k < (coarse < 1.0 ? 4u : 0u); ++k) {
@@ -272,10 +295,12 @@ void gather(MapRecord record, vec2 uv, Reach r, uint lobe_layer, out Cell cells[
             vec3 normal = vec3(0.0);
             if (record.upright == 0u) {
                 normal = fetch(MOMENT_CLASSES, record.moments, 0u, vec2(centre.x, 1.0 - centre.y), 0.0).xyz;
+                normal = CAMERA ? moments_turned(turn, normal) : normal;
             }
             for (uint j = 0u; j < record.count; ++j) {
                 vec4 lobe = fetch(MOMENT_CLASSES, record.moments, lobe_layer + j, vec2(centre.x, 1.0 - centre.y), 0.0);
                 float weight = record.weights[j] * share.x * share.y * ((1.0 - coarse) / r.taps);
+                lobe.xyz = CAMERA ? moments_turned(turn, lobe.xyz) : lobe.xyz;
                 uint cell = moments_cell(filter_cells(FILTER), vec3(lobe.xy, 1.0 - lobe.z));
                 // Selected, not indexed: lanes would go to memory for a place of their own.
                 for (uint i = 0u; i < CELLS; ++i) {
@@ -294,8 +319,16 @@ void decode(ivec2 p, MapRecord record, vec2 uv, vec4 footprint, inout Found f) {
     Reach r = reach_of(MOMENT_CLASSES, record.moments, footprint);
     uint layer = record.upright != 0u ? 0u : 1u;
     if (filter_of_cells(FILTER)) {
+        uint code = record.cells;
+        mat3 turn = mat3(1.0);
+        if (CAMERA && code != 0u) {
+            code = objects[gbuffer_object(p)];
+            mat3 camera = mat3(frame.world_from_view[0].xyz, frame.world_from_view[1].xyz, frame.world_from_view[2].xyz);
+            turn = transpose(camera) * f.frame;
+            f.frame = camera;
+        }
         Cell cells[CELLS];
-        gather(record, uv, r, layer, cells);
+        gather(record, code, turn, uv, r, layer, cells);
         Cell all = Cell(vec4(0.0), 0.0, vec3(0.0));
         for (uint i = 0u; i < filter_cells(FILTER); ++i) {
             all = both(all, cells[i]);
@@ -379,11 +412,7 @@ void main() {
         n = record.places.z != 0u && t.w != 0.0 ? bent : n;
     }
     if (LOBES != 0u) {
-        vec3 x, y;
-        tangent_basis(n, x, y);
-        x = t.w != 0.0 ? t.xyz : x;
-        y = t.w != 0.0 ? cross(n, x) * t.w : y;
-        Found found = Found(mat3(x, y, n), f.kernel, 0u, 0.0, vec3(0.0), record.lobes, 1.0);
+        Found found = Found(tangent_frame(n, t), f.kernel, 0u, 0.0, vec3(0.0), record.lobes, 1.0);
         if (record.moments != 0u) {
             decode(p, record, uv, footprint, found);
         } else if (filter_of_slopes(FILTER)) {

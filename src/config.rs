@@ -152,6 +152,31 @@ impl Filter {
     }
 }
 
+/// The frame whose cells of directions filters with cells gather lobes in. Lobes of one cell become one.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Bins {
+    /// The surface's tangent frame: made once a set of materials, whatever geometry and camera do.
+    #[default]
+    Tangent,
+    /// The camera's, of each draw that is shown, made anew in every frame (Xu et al. 2017, section 4): lobes change their cells as
+    /// the camera turns, and these hold what the mesh curves within a texel, too, so that [`Config::geometric`] counts it twice.
+    /// Needs [`Renderer::reserve_cells`], texture coordinates in the unit square under tiling 1 that no two places of a draw share
+    /// ([`crate::distribution::chart`], which a host asks itself), and an object number of its own for every draw.
+    ///
+    /// [`Renderer::reserve_cells`]: crate::Renderer::reserve_cells
+    Camera,
+}
+
+impl Bins {
+    /// The name by which they are asked for.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Tangent => "tangent",
+            Self::Camera => "camera",
+        }
+    }
+}
+
 /// When [`Filter::Vmf`] divides a cell.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Division {
@@ -217,6 +242,8 @@ pub struct Config {
     pub eps: f64,
     /// How materials are read.
     pub filter: Filter,
+    /// Where filters with cells have these. [`Bins::Camera`] asks for such a filter, and for draws.
+    pub bins: Bins,
     /// Most look-ups along the longer axis of what a pixel covers of a map, 1 to 16.
     pub anisotropy: u32,
     /// Added to the level at which maps are looked up, -16 to 16.
@@ -259,6 +286,7 @@ impl Config {
             combine: Combine::default(),
             eps: EPS,
             filter: Filter::default(),
+            bins: Bins::default(),
             anisotropy: 1,
             lod_bias: 0.0,
             division: Division::default(),
@@ -347,6 +375,12 @@ impl Config {
         )?;
         check((1..=256).contains(&self.probes), "probes", "1 to 256", self.probes.to_string())?;
         check((1..=16).contains(&self.anisotropy), "anisotropy", "1 to 16", self.anisotropy.to_string())?;
+        if self.bins == Bins::Camera {
+            let expected = "tangent, unless the filter is vmf4, vmf8 or vmf";
+            check(self.filter.has_cells(), "bins", expected, format!("camera with {}", self.filter.name()))?;
+            let draws = matches!(self.gbuffer, GBufferSource::Draws);
+            check(draws, "bins", "tangent, unless the G-buffer is made of draws", "camera with the host's G-buffer".into())?;
+        }
         check(self.lod_bias.abs() <= 16.0, "lod_bias", "-16 to 16", self.lod_bias.to_string())?;
         if let Division::Lengths(lengths) = self.division {
             let inside = lengths.iter().all(|length| *length > 0.0 && *length < 1.0);

@@ -58,6 +58,11 @@ impl Renderer {
         self.materials.as_ref()?.0.maps.moments(material)
     }
 
+    /// The arrays of an object's frames and of the cells of its own in the last frame, and its layers there.
+    pub(crate) fn object_cells(&self, object: u32) -> Option<MomentArrays<'_>> {
+        self.cells.as_ref()?.arrays(object, &self.materials.as_ref()?.0.maps)
+    }
+
     /// Layout of set 1.
     pub(crate) fn material_layout(&self) -> vk::DescriptorSetLayout {
         self.bridge.layout

@@ -25,7 +25,7 @@ pub mod texture;
 mod view;
 
 pub use ash;
-pub use config::{Config, Division, Estimator, Filter, GBufferSource, Rate};
+pub use config::{Bins, Config, Division, Estimator, Filter, GBufferSource, Rate};
 pub use error::{Error, Result};
 pub use frame::{EnvironmentUse, FrameInputs, GBufferInput, Output};
 pub use glam;

@@ -1,6 +1,6 @@
 //! The frame's passes, created from a configuration: only those that it records.
 
-use crate::config::{Config, Estimator, GBufferSource, Rate};
+use crate::config::{Bins, Config, Estimator, GBufferSource, Rate};
 use crate::error::Result;
 use crate::frequency::allocation::Allocation;
 use crate::gpu::pipeline::BridgeLayouts;
@@ -8,7 +8,7 @@ use crate::gpu::retire::{Build, Retired};
 use crate::pass::gbuffer::GBuffer;
 use crate::pass::{
     PassContext, allocate, bandwidth, base, brdf_map, classify, curvature, environment_bandwidth, luminance, prefilter, pyramid,
-    resolve, shade, tonemap, upsample, vmf_mips,
+    resolve, shade, texture_space, tonemap, upsample, vmf_mips,
 };
 use ash::vk;
 
@@ -18,6 +18,8 @@ pub(crate) struct Passes {
     pub prefilter: Option<prefilter::Prefilter>,
     /// Those over the maps of materials, if the filter stores moments.
     pub moments: Option<(brdf_map::BrdfMap, vmf_mips::VmfMips)>,
+    /// Where objects have cells of their own.
+    pub texture_space: Option<texture_space::TextureSpace>,
     pub gbuffer: Option<GBuffer>,
     pub curvature: Option<curvature::Curvature>,
     pub bandwidth: Option<bandwidth::Bandwidth>,
@@ -64,9 +66,10 @@ impl Passes {
                 .transpose()?,
             prefilter: looked_up.then(|| prefilter::Prefilter::new(&mut p)).transpose()?,
             moments: match config.filter.stored() {
-                Some(_) => Some((brdf_map::BrdfMap::new(&mut p, config)?, vmf_mips::VmfMips::new(&mut p, config.filter)?)),
+                Some(_) => Some((brdf_map::BrdfMap::new(&mut p, config)?, vmf_mips::VmfMips::new(&mut p, config)?)),
                 None => None,
             },
+            texture_space: (config.bins == Bins::Camera).then(|| texture_space::TextureSpace::new(&mut p)).transpose()?,
             gbuffer,
             curvature: config.curvature.then(|| curvature::Curvature::new(&mut p)).transpose()?,
             bandwidth: predicted.then(|| bandwidth::Bandwidth::new(&mut p, config)).transpose()?,
@@ -90,6 +93,9 @@ impl Passes {
         if let Some((map, mips)) = self.moments {
             map.retire(bag);
             mips.retire(bag);
+        }
+        if let Some(pass) = self.texture_space {
+            pass.retire(bag);
         }
         if let Some(pass) = self.gbuffer {
             pass.retire(bag);

@@ -17,14 +17,16 @@ use crate::light;
 use crate::pass::environment::EnvironmentImages;
 use crate::pass::gbuffer;
 use crate::pass::materials::{MaterialBridge, MaterialImages};
+use crate::pass::object_cells::ObjectCells;
 use crate::pass::{
-    FrameUniform, allocate, bandwidth, base, classify, curvature, filter, level, luminance, pyramid, resolve, shade, tonemap,
-    upsample,
+    FrameUniform, allocate, bandwidth, base, classify, curvature, filter, level, luminance, pyramid, resolve, shade,
+    texture_space, tonemap, upsample, vmf_mips,
 };
 use crate::passes::{Passes, Sampled};
 use crate::plan::{Directions, LIGHT_BYTES};
 use crate::targets::Targets;
 use ash::vk;
+use glam::Mat3;
 
 /// Says so when a renderer is dropped instead of destroyed: its handles leak, since submitted work may still use them.
 struct Undestroyed;
@@ -56,6 +58,8 @@ pub struct Renderer {
     pub(crate) environment: Option<EnvironmentImages>,
     /// With the pass that is compiled for their maps.
     pub(crate) materials: Option<(MaterialImages, filter::Filter)>,
+    /// Of objects, where these have some of their own.
+    pub(crate) cells: Option<ObjectCells>,
     undestroyed: Undestroyed,
 }
 
@@ -105,6 +109,7 @@ impl Renderer {
             shown: false,
             environment: None,
             materials: None,
+            cells: None,
             undestroyed: Undestroyed,
         })
     }
@@ -127,6 +132,11 @@ impl Renderer {
         };
         if let GBufferInput::Draws(draws) = inputs.gbuffer {
             gbuffer::check_materials(draws, materials.count)?;
+            match (&self.cells, &self.passes.texture_space) {
+                (Some(objects), _) => objects.check(draws, &materials.maps)?,
+                (None, Some(_)) => return Err(Error::CallOrder { called: "record", before: "reserve_cells" }),
+                (None, None) => {}
+            }
         }
         if let Some(timings) = self.timer.begin_frame(&self.cx, cmd, inputs.slot)? {
             self.timings = Some(timings);
@@ -155,9 +165,19 @@ impl Renderer {
         };
         let bridge = BridgeSets { gbuffer, materials: self.bridge.write(rec, materials, samplers) };
 
-        // 2  Their materials at the pixel's scale.
+        // 2  Their materials at the pixel's scale, by cells of directions that may be each object's own.
+        let objects = self.cells.as_ref();
+        if let (Some(pass), Some((_, mips)), Some(objects), GBufferInput::Draws(draws)) =
+            (&passes.texture_space, &passes.moments, objects, inputs.gbuffer)
+        {
+            let world_from_view = inputs.view.world_from_view();
+            let (maps, eye) = (&materials.maps, world_from_view.w_axis.truncate());
+            pass.record(rec, &texture_space::Io { draws, eye, objects });
+            let view_from_world = Mat3::from_mat4(world_from_view).transpose();
+            mips.record_objects(rec, &vmf_mips::ObjectIo { maps, objects, draws, view_from_world });
+        }
         let (normals, factors, lobes) = (&targets.normals, &targets.factors, &targets.lobes);
-        filter.record(rec, &filter::Io { frame, bridge, samplers, maps: &materials.maps, normals, factors, lobes });
+        filter.record(rec, &filter::Io { frame, bridge, samplers, maps: &materials.maps, objects, normals, factors, lobes });
         if let (Some(pass), Some(curvature)) = (&passes.curvature, &targets.curvature) {
             pass.record(rec, &curvature::Io { frame, bridge, samplers, normals, curvature });
         }
@@ -343,6 +363,9 @@ impl Renderer {
         let mut bag = Retired::default();
         if let Some(environment) = self.environment {
             environment.retire(&mut self.states, &mut bag);
+        }
+        if let Some(cells) = self.cells {
+            cells.retire(&mut self.states, &mut bag);
         }
         if let Some((materials, filter)) = self.materials {
             materials.retire(&mut self.states, &mut bag);

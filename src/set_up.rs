@@ -1,8 +1,8 @@
 //! What is recorded when something changes: the environment, the materials.
 
-use crate::config::{Estimator, Rate};
+use crate::config::{Bins, Estimator, Rate};
 use crate::distribution::effective::Rule;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::gpu::memory::HostAllocator;
 use crate::gpu::pipeline::BridgeLayouts;
 use crate::gpu::recorder::Recorder;
@@ -10,8 +10,10 @@ use crate::gpu::retire::{Build, Retired};
 use crate::gpu::timer::FrameTimings;
 use crate::material::Material;
 use crate::pass::environment::{Analyses, EnvironmentUpload};
+use crate::pass::gbuffer::{self, Draw};
 use crate::pass::maps::Reading;
 use crate::pass::materials::MaterialsUpload;
+use crate::pass::object_cells::{ObjectCells, Seats};
 use crate::pass::{PassContext, base, brdf_map, filter, vmf_mips};
 use crate::passes::layout;
 use crate::renderer::Renderer;
@@ -46,7 +48,8 @@ impl Renderer {
     }
 
     /// Replaces the materials: builds their importance tables, compiles the pass that reads their maps and records the uploads.
-    /// Draws and G-buffers name them by index. The bag holds the staging memory and the former materials.
+    /// Draws and G-buffers name them by index. The bag holds the staging memory and the former materials. With
+    /// [`Bins::Camera`], [`Self::reserve_cells`] comes after it.
     ///
     /// # Errors
     /// As [`Self::new`]; the former materials stay then.
@@ -63,13 +66,15 @@ impl Renderer {
         let config = &self.config;
         let rule = if config.takes_lobes_literally() { Rule::Literal } else { Rule::Exact };
         let (modules, slots, widened) = (&config.modules, config.frames_in_flight, config.widened());
-        let (filter, passes, samplers) = (self.config.filter, self.passes.moments.as_ref(), &self.samplers);
+        let (filter, bins) = (self.config.filter, self.config.bins);
+        let (passes, samplers) = (self.passes.moments.as_ref(), &self.samplers);
         let eps = (self.config.rate == Rate::Bandwidth).then_some(self.config.eps);
         if self.config.estimator == Estimator::Preconvolved {
             base::check_materials(materials)?;
         }
         let (mut upload, filter) = Build::run(&self.cx, memory, |build| {
-            let upload = MaterialsUpload::new(build, materials, &Reading { filter, rule, widened, passes, samplers }, eps)?;
+            let reading = Reading { filter, bins, rule, widened, passes, samplers };
+            let upload = MaterialsUpload::new(build, materials, &reading, eps)?;
             let mut p = PassContext { build, modules, bridge, slots };
             let filter = filter::Filter::new(&mut p, config, upload.uses())?;
             Ok((upload, filter))
@@ -87,11 +92,46 @@ impl Renderer {
             of_map.retire(&mut bag);
             of_mips.retire(&mut bag);
         }
+        if let Some(former) = self.cells.take() {
+            // They are made from the former materials' lobes.
+            former.retire(&mut self.states, &mut bag);
+        }
         if let Some((former, pass)) = self.materials.replace((fresh, filter)) {
             former.retire(&mut self.states, &mut bag);
             pass.retire(&mut bag);
         }
         Ok(bag)
+    }
+
+    /// Makes room for the cells of `draws` with [`Bins::Camera`], before the frames that show them, or some of them: by the
+    /// material and the number of each. Where there is just that room it stays; nothing happens with [`Bins::Tangent`]. The bag
+    /// holds the former room.
+    ///
+    /// # Errors
+    /// [`Error::CallOrder`] before [`Self::record_materials`]; [`Error::InvalidInput`] for draws that cannot be encoded or that
+    /// share a number; [`Error::Allocation`], or as [`Self::new`] for more layers than an image has. The former room stays then.
+    pub fn reserve_cells(&mut self, draws: &[Draw], memory: &mut dyn HostAllocator) -> Result<Retired> {
+        let mut bag = Retired::default();
+        let (Bins::Camera, Some((_, mips))) = (self.config.bins, &self.passes.moments) else { return Ok(bag) };
+        let Some((materials, _)) = &self.materials else {
+            return Err(Error::CallOrder { called: "reserve_cells", before: "record_materials" });
+        };
+        gbuffer::check(draws)?;
+        gbuffer::check_materials(draws, materials.count)?;
+        let seats = Seats::of(draws, &materials.maps)?;
+        if self.cells.as_ref().is_none_or(|cells| *cells.seats() != seats) {
+            let fresh = Build::run(&self.cx, memory, |build| ObjectCells::new(build, mips, &materials.maps, seats))?;
+            if let Some(former) = self.cells.replace(fresh) {
+                former.retire(&mut self.states, &mut bag);
+            }
+        }
+        Ok(bag)
+    }
+
+    /// Texels of the map of which each draw of a material makes cells of its own, if it does: what
+    /// [`chart::check`](crate::distribution::chart::check) takes.
+    pub fn cell_map(&self, material: u32) -> Option<[u32; 2]> {
+        Some(self.materials.as_ref()?.0.maps.divided(material)?.size)
     }
 
     /// GPU times of the last [`Self::record_materials`], which has run; `None` without timestamps.

@@ -1,11 +1,11 @@
 //! Scene files: every key is accepted or not supported yet, everything else is refused with its line.
 #![cfg(feature = "offline")]
 
-use passband::Light;
 use passband::offline::error::{At, Error};
 use passband::offline::scene::Scene;
 use passband::offline::world::World;
 use passband::reflectance::Model;
+use passband::{Bins, Light};
 use std::path::Path;
 
 /// The smallest valid scene, with places to add to: line 3, 6, 9 and after 11.
@@ -102,30 +102,6 @@ fn keys_that_work() {
     for file in ["x.obj", "x.ply", "x.off", "x.glb", "x.gltf", "x.obj.gz", "x.PLY"] {
         load_text(&BASE.replace("builtin = 'plane'", &format!("mesh = '{file}'")), &[]).unwrap();
     }
-}
-
-#[test]
-fn keys_that_do_not_work_yet_say_so() {
-    let mut lines = Vec::new();
-    let settings = ["bins = 'camera'", "bins = 'tangent'"];
-    for text in settings {
-        lines.push(("material", format!("[settings]\n{text}"), text.split(' ').next().unwrap()));
-    }
-    for (mark, text, key) in &lines {
-        not_yet(&with(mark, text), key);
-    }
-}
-
-fn not_yet(text: &str, key: &str) {
-    let e = load_text(text, &[]).unwrap_err();
-    assert_one_line(&e);
-    let Error::NotSupportedYet { what } = &e else { panic!("{e:?} for\n{text}") };
-    assert!(what.ends_with(key), "{key}: {e}");
-    // The line is where the key stands in the file.
-    let (file, line) = what.rsplit_once(": ").unwrap().0.rsplit_once(':').unwrap();
-    assert!(file.ends_with("scene.toml"), "{e}");
-    let found = text.lines().nth(line.parse::<usize>().unwrap() - 1).unwrap();
-    assert!(found.contains(key.split('.').next_back().unwrap().trim_matches('0')), "{e}: {found}");
 }
 
 #[test]
@@ -345,8 +321,8 @@ fn overrides_are_checked_like_the_file() {
     }
     let deep = vec!["a"; 100_000].join(".");
     assert!(matches!(load_text(BASE, &[(&deep, "1")]), Err(Error::Argument { .. })));
-    let e = load_text(BASE, &[("settings.bins", "'camera'")]).unwrap_err();
-    assert_eq!(e.to_string(), "--set settings.bins is not supported yet");
+    let e = load_text(BASE, &[("settings.bins", "'world'")]).unwrap_err();
+    assert!(e.to_string().starts_with("--set settings.bins: expected camera"), "{e}");
     // A mistake in the file stays the file's.
     let e = load_text(&with("camera", "fov = 3"), &[("environment.intensity", "2")]).unwrap_err();
     assert!(matches!(e, Error::File { at: At::Line(3), .. }), "{e}");
@@ -463,6 +439,10 @@ fn settings_reach_the_frame() {
     assert_eq!(load("combine = 'mean'").combine, Combine::Mean);
     assert_eq!(load("combine = 'max'").combine, Combine::Max);
     assert_eq!((load("lmax = 5").lmax, load("geometric = true").geometric), (5, true));
+    assert_eq!(
+        ["bins = 'camera'", "bins = 'tangent'", ""].map(|text| load(text).bins),
+        [Bins::Camera, Bins::Tangent, Bins::Tangent]
+    );
     assert_eq!((load("eps = 0.02").eps, load("").eps), (0.02, 0.01));
     assert_eq!((load("budget = 32").directions, load("np_rule = 'sqrt'").allocation.name()), (32, "sqrt"));
     let none = load("");

@@ -251,8 +251,8 @@ fn committed_modules_ask_for_no_more_than_the_baseline() {
     }
 }
 
-/// What the passes bind: set 0 the G-buffer bridge, set 1 the material bridge, set 2 the pass's own, and the rasteriser's
-/// push constants, which are as large as every device allows.
+/// What the passes bind: set 0 the G-buffer bridge, set 1 the material bridge, set 2 the pass's own, and the rasterisers'
+/// push constants, at most as large as every device allows.
 fn bound_by_rust() -> Vec<ModuleInterface> {
     let set = |set: u32, types: &[vk::DescriptorType]| -> Vec<_> {
         (0..).zip(types).map(|(binding, &kind)| (set, binding, kind)).collect()
@@ -268,10 +268,11 @@ fn bound_by_rust() -> Vec<ModuleInterface> {
         let name = format!("{}.comp", interface.name);
         ModuleInterface { name, local_size: interface.local_size, push_constant_bytes: interface.push_bytes, bindings }
     });
-    let raster = ["gbuffer.vert", "gbuffer.frag"].map(|name| ModuleInterface {
+    let raster = [("gbuffer.vert", 128), ("gbuffer.frag", 128), ("texture_space.vert", 112), ("texture_space.frag", 112)];
+    let raster = raster.map(|(name, push_constant_bytes)| ModuleInterface {
         name: name.into(),
         local_size: [0; 3],
-        push_constant_bytes: 128,
+        push_constant_bytes,
         bindings: Vec::new(),
     });
     compute.chain(raster).collect()

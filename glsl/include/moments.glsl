@@ -7,7 +7,8 @@
 //   vmf4, vmf8, vmf:                     of a base texel each lobe as vmf1 has it; from level 1 on, in images of half the size,
 //                                        of each cell weight times characteristic vector (w x, w y, w - w z) and weight w; then
 //                                        weight times spread, four cells in a layer; then, if lobes are not about the normal,
-//                                        weight times the normal of each cell's texels (w x, w y, w - w z)
+//                                        weight times the normal of each cell's texels (w x, w y, w - w z). With bins in camera space
+//                                        the cells are an object's own, in view space, of weight 0 where it shows nothing
 // Lobes kept apart have the weights that they have everywhere. In front, if lobes are not about the normal: the mean normal.
 #ifndef MOMENTS_GLSL
 #define MOMENTS_GLSL
@@ -75,6 +76,12 @@ vec3 moments_direction(vec3 r) {
     vec3 v = vec3(r.xy, 1.0 - r.z);
     float square = dot(v, v);
     return square > 0.0 ? v * inversesqrt(square) : vec3(0.0, 0.0, 1.0);
+}
+
+// A vector that is stored as x, y, 1 - z, turned.
+vec3 moments_turned(mat3 turn, vec3 r) {
+    vec3 v = turn * vec3(r.xy, 1.0 - r.z);
+    return vec3(v.xy, 1.0 - v.z);
 }
 
 // The concentration of the lobe that a filter with lobes of directions finds in moments.

@@ -34,4 +34,13 @@ vec4 tangent_decode(vec3 n, float code) {
     return code == 0.0 ? vec4(0.0) : vec4(x * turn.x + y * turn.y, code < 0.0 ? -1.0 : 1.0);
 }
 
+// World from the tangent frame of unit n: about tangent t of such handedness, or about any if there is none.
+mat3 tangent_frame(vec3 n, vec4 t) {
+    vec3 x, y;
+    tangent_basis(n, x, y);
+    x = t.w != 0.0 ? t.xyz : x;
+    y = t.w != 0.0 ? cross(n, x) * t.w : y;
+    return mat3(x, y, n);
+}
+
 #endif

@@ -122,21 +122,40 @@ impl Image {
 
     /// A view of all layers of each level, which the caller retires.
     pub(crate) fn level_views(&self, build: &mut Build<'_>) -> Result<Vec<vk::ImageView>> {
-        let range = |base_mip_level| vk::ImageSubresourceRange {
+        let kind = if self.desc.layers.is_some() { vk::ImageViewType::TYPE_2D_ARRAY } else { vk::ImageViewType::TYPE_2D };
+        let layers = self.desc.layers.unwrap_or(1);
+        (0..self.desc.levels).map(|level| self.part(build, kind, level, 0..layers)).collect()
+    }
+
+    /// A view of the first level of each layer, which the caller retires.
+    pub(crate) fn layer_views(&self, build: &mut Build<'_>) -> Result<Vec<vk::ImageView>> {
+        let kind = vk::ImageViewType::TYPE_2D;
+        (0..self.desc.layers.unwrap_or(1)).map(|layer| self.part(build, kind, 0, layer..layer + 1)).collect()
+    }
+
+    /// A view of layers of one level.
+    fn part(
+        &self,
+        build: &mut Build<'_>,
+        kind: vk::ImageViewType,
+        base_mip_level: u32,
+        layers: std::ops::Range<u32>,
+    ) -> Result<vk::ImageView> {
+        let range = vk::ImageSubresourceRange {
             aspect_mask: self.desc.aspect(),
             base_mip_level,
             level_count: 1,
-            layer_count: self.desc.layers.unwrap_or(1),
-            ..Default::default()
+            base_array_layer: layers.start,
+            layer_count: layers.len() as u32,
         };
-        let kind = if self.desc.layers.is_some() { vk::ImageViewType::TYPE_2D_ARRAY } else { vk::ImageViewType::TYPE_2D };
-        let info = vk::ImageViewCreateInfo::default().image(self.handle).view_type(kind).format(self.desc.format);
-        let view = |level| {
-            // SAFETY: the image is bound.
-            let view = unsafe { build.cx.device.create_image_view(&info.subresource_range(range(level)), None) };
-            Ok(build.track(view.named("vkCreateImageView")?, Handle::View))
-        };
-        (0..self.desc.levels).map(view).collect()
+        let info = vk::ImageViewCreateInfo::default()
+            .image(self.handle)
+            .view_type(kind)
+            .format(self.desc.format)
+            .subresource_range(range);
+        // SAFETY: the image is bound.
+        let view = unsafe { build.cx.device.create_image_view(&info, None) };
+        Ok(build.track(view.named("vkCreateImageView")?, Handle::View))
     }
 
     pub(crate) fn extent(&self) -> [u32; 2] {

@@ -13,7 +13,8 @@ pub(crate) struct RasterPipeline {
 }
 
 impl RasterPipeline {
-    /// `vertices` are streams, binding and location i of format i, whose strides are bound with them.
+    /// `vertices` are streams, binding and location i of format i, whose strides are bound with them. Nothing is tested against
+    /// depth if its format is `UNDEFINED`.
     pub fn new(
         build: &mut Build<'_>,
         modules: &Modules,
@@ -61,8 +62,8 @@ impl RasterPipeline {
             .line_width(1.0);
         let samples = vk::PipelineMultisampleStateCreateInfo::default().rasterization_samples(vk::SampleCountFlags::TYPE_1);
         let test = vk::PipelineDepthStencilStateCreateInfo::default()
-            .depth_test_enable(true)
-            .depth_write_enable(true)
+            .depth_test_enable(depth != vk::Format::UNDEFINED)
+            .depth_write_enable(depth != vk::Format::UNDEFINED)
             .depth_compare_op(vk::CompareOp::LESS);
         let write = vk::PipelineColorBlendAttachmentState::default().color_write_mask(vk::ColorComponentFlags::RGBA);
         let attachments = vec![write; colors.len()];

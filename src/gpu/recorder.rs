@@ -78,6 +78,11 @@ impl<'a> Recorder<'a> {
         self.raw_image(image.handle, image.desc.aspect(), access);
     }
 
+    /// Declares a further use of an image in the pass that is open, of bytes that count already.
+    pub fn again(&mut self, image: &Image, access: Access) {
+        self.raw_image(image.handle, image.desc.aspect(), access);
+    }
+
     /// Declares that the whole image is about to be overwritten: its contents need not survive.
     pub fn overwrite(&mut self, image: &Image, access: Access) {
         if let Some(state) = self.states.0.get_mut(&image.handle.as_raw()) {

@@ -8,6 +8,7 @@ use crate::gpu::recorder::Recorder;
 use crate::gpu::retire::{Build, Retired};
 use crate::offline::error::{Error, Result};
 use crate::offline::session::{Session, closed};
+use crate::pass::maps::MomentArrays;
 use crate::renderer::Renderer;
 use ash::vk;
 use std::ops::Range;
@@ -62,8 +63,21 @@ impl Session {
     /// # Errors
     /// The device's.
     pub fn moments(&mut self, material: usize) -> Result<Option<[Vec<MomentLevels>; 2]>> {
+        self.arrays(|renderer| renderer.moments(material))
+    }
+
+    /// What an object has in the last frame with [`crate::Bins::Camera`], if it has cells of its own: the frames of its texels in
+    /// one layer, as `glsl/texture_space.frag` writes them, and its cells, layer by layer.
+    ///
+    /// # Errors
+    /// The device's.
+    pub fn object_cells(&mut self, object: u32) -> Result<Option<[Vec<MomentLevels>; 2]>> {
+        self.arrays(|renderer| renderer.object_cells(object))
+    }
+
+    fn arrays(&mut self, of: impl Fn(&Renderer) -> Option<MomentArrays<'_>>) -> Result<Option<[Vec<MomentLevels>; 2]>> {
         let renderer = self.renderer.as_ref().ok_or_else(closed)?;
-        let Some(arrays) = renderer.moments(material) else { return Ok(None) };
+        let Some(arrays) = of(renderer) else { return Ok(None) };
         let layers = arrays.map(|array| array.map(|(image, layers)| (image.desc, layers)));
         let mut found = [Vec::new(), Vec::new()];
         for ((i, layers), found) in layers.into_iter().enumerate().zip(&mut found) {
@@ -71,9 +85,7 @@ impl Session {
                 let level = |level| {
                     let [width, height, _] = desc.level_extent(level);
                     let bytes = self.read(u64::from(width) * u64::from(height) * 16, |renderer, rec, target| {
-                        if let Some((image, _)) =
-                            renderer.moments(material).and_then(|[moments, cells]| [moments, cells][i].clone())
-                        {
+                        if let Some((image, _)) = of(renderer).and_then(|arrays| arrays[i].clone()) {
                             copy_layers(rec, image, target, level, layer..layer + 1);
                         }
                     })?;

@@ -249,6 +249,7 @@ pub(super) fn report(
         ("rate", json!(settings.rate())),
         ("lmax", json!(config.lmax)),
         ("filter", json!(settings.supersample.map_or(config.filter.name(), |_| "supersample"))),
+        ("bins", json!(config.bins.name())),
         ("anisotropy", json!(config.anisotropy)),
         ("literal_lobes", json!(config.takes_lobes_literally())),
         ("probes", json!(config.probes)),

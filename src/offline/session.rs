@@ -1,5 +1,6 @@
 //! A world on a device: uploaded once, rendered frame by frame, read back.
 
+use crate::distribution::chart;
 use crate::gpu::access::{Access, ImageRef};
 use crate::gpu::buffer::Buffer;
 use crate::gpu::image::{Image, ImageDesc};
@@ -141,6 +142,7 @@ impl Session {
         let (meshes, record_ms) = (HashMap::new(), 0.0);
         let mut session = Self { headless, renderer: Some(renderer), meshes, shown, setup, material_bytes, record_ms };
         session.upload_objects(world, &mut HashMap::new())?;
+        session.reserve_cells(world)?;
         session.setup.push((MESHES, milliseconds(clock)));
         Ok(session)
     }
@@ -167,7 +169,22 @@ impl Session {
         if let Some((_, time)) = self.setup.iter_mut().find(|(name, _)| *name == MESHES) {
             *time += milliseconds(clock);
         }
-        uploaded
+        uploaded.and_then(|()| self.reserve_cells(world))
+    }
+
+    /// Room for the cells that objects have of their own, once it is sure that their maps can hold them.
+    fn reserve_cells(&mut self, world: &World) -> Result<()> {
+        let renderer = self.renderer.as_mut().ok_or_else(closed)?;
+        for (i, object) in world.objects.iter().enumerate() {
+            if let Some(size) = renderer.cell_map(object.material as u32) {
+                chart::check(&format!("objects[{i}]"), &object.mesh.uvs, &object.mesh.indices, size)?;
+            }
+        }
+        let (host, memory) = self.headless.parts()?;
+        let bag = renderer.reserve_cells(&self.shown.draws, memory)?;
+        // SAFETY: every submission was waited for.
+        unsafe { bag.free(host.device, memory) };
+        Ok(())
     }
 
     /// Shows a part of the camera's image from the next frame on, until [`Self::show`].

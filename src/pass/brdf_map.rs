@@ -134,18 +134,24 @@ impl Group {
         first
     }
 
-    /// Images of moments and, where there are some, of cells, with room for the mips that are read.
-    pub fn images(&self, build: &mut Build<'_>) -> Result<Vec<Image>> {
+    /// Images of moments and, where there are some, of cells, with room for the mips that `filter` reads.
+    pub fn images(&self, build: &mut Build<'_>, filter: Filter) -> Result<Vec<Image>> {
         let [width, height] = self.size;
         let levels = 1 + width.max(height).ilog2();
         // Beside cells only a mean normal has mips.
-        let flat = self.layers.cells > 0 && self.sources.iter().all(|(source, _)| source.base.upright());
+        let flat = filter.has_cells() && self.sources.iter().all(|(source, _)| source.base.upright());
         let mut images = vec![image(build, "moments", self.size, self.layers.moments, if flat { 1 } else { levels })?];
         if self.layers.cells > 0 {
-            images.push(image(build, "cells", halved(self.size), self.layers.cells, (levels - 1).max(1))?);
+            images.push(cells(build, self.size, self.layers.cells)?);
         }
         Ok(images)
     }
+}
+
+/// An image of cells of a map of `size`, with its levels from 1 on.
+pub(crate) fn cells(build: &mut Build<'_>, size: [u32; 2], layers: usize) -> Result<Image> {
+    let levels = size[0].max(size[1]).ilog2();
+    image(build, "cells", halved(size), layers, levels.max(1))
 }
 
 fn image(build: &mut Build<'_>, name: &'static str, [width, height]: [u32; 2], layers: usize, levels: u32) -> Result<Image> {

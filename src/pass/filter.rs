@@ -1,6 +1,6 @@
 //! Pass 2: what the surfaces' textures say at the pixel's scale: shading normals, factors, roughness and lobes.
 
-use crate::config::{Config, Division};
+use crate::config::{Bins, Config, Division};
 use crate::error::Result;
 use crate::gpu::access::Access;
 use crate::gpu::buffer::Buffer;
@@ -10,6 +10,7 @@ use crate::gpu::recorder::Recorder;
 use crate::gpu::retire::Retired;
 use crate::gpu::sampler::Samplers;
 use crate::pass::maps::{MapImages, Uses};
+use crate::pass::object_cells::ObjectCells;
 use crate::pass::{PassContext, brdf_map};
 use crate::texture::classes::MAX_CLASSES;
 use ash::vk::DescriptorType as D;
@@ -38,6 +39,7 @@ pub const INTERFACE: Interface = Interface {
         D::STORAGE_IMAGE,
         D::STORAGE_IMAGE,
         D::STORAGE_IMAGE,
+        D::STORAGE_BUFFER,
     ],
 };
 
@@ -46,6 +48,8 @@ pub(crate) struct Io<'a> {
     pub bridge: BridgeSets,
     pub samplers: &'a Samplers,
     pub maps: &'a MapImages,
+    /// Where they have cells of their own.
+    pub objects: Option<&'a ObjectCells>,
     /// Out: shading normal; tangent as `glsl/include/tangent.glsl` encodes it.
     pub normals: &'a Image,
     /// Out: as `glsl/include/factors.glsl` packs them.
@@ -67,6 +71,7 @@ impl Filter {
         };
         let [one, quarters] = lengths.map(f32::to_bits);
         let read = [config.anisotropy, config.lod_bias.to_bits(), u32::from(config.takes_lobes_literally()), one, quarters];
+        let read = read.into_iter().chain([u32::from(config.bins == Bins::Camera)]);
         let lobes = [brdf_map::number(filter), filter.lobe_layers()].into_iter().chain(read);
         let constants = [albedo, specular, normal, roughness, geometric, moments, cells];
         let constants: Vec<_> = constants.into_iter().chain(lobes).collect();
@@ -76,14 +81,17 @@ impl Filter {
     pub fn record(&self, rec: &mut Recorder<'_>, io: &Io<'_>) {
         rec.begin(NAME);
         io.maps.sampled(rec);
+        io.objects.into_iter().for_each(|objects| objects.sampled(rec));
         rec.overwrite(io.normals, Access::COMPUTE_WRITE);
         rec.overwrite(io.factors, Access::COMPUTE_WRITE);
         rec.overwrite(io.lobes, Access::COMPUTE_WRITE);
         rec.flush();
         let mut resources = vec![Resource::Uniform(io.frame), Resource::Buffer(io.maps.records())];
         // Bindings without a class of their own are never read.
-        resources.extend((0..MAX_CLASSES).map(|i| Resource::Sampled(io.maps.class(i), io.samplers.tiled)));
+        let class = |i| io.objects.and_then(|objects| objects.class(i)).unwrap_or_else(|| io.maps.class(i));
+        resources.extend((0..MAX_CLASSES).map(|i| Resource::Sampled(class(i), io.samplers.tiled)));
         resources.extend([io.normals, io.factors, io.lobes].map(|image| Resource::Storage(image.view)));
+        resources.push(Resource::Buffer(io.objects.map_or(io.maps.records(), ObjectCells::table)));
         self.0.bind(rec, io.bridge, &resources, &());
         self.0.dispatch(rec, io.normals.extent());
         rec.end();

@@ -27,6 +27,18 @@ const DEPTH: vk::Format = vk::Format::D32_SFLOAT;
 /// Contents of the buffer that stands in for missing tangents.
 pub(crate) const NO_TANGENT: [u8; 16] = [0; 16];
 
+/// Formats of the streams of a [`Draw`], in the order in which [`Draw::record`] binds them.
+pub(crate) const STREAMS: [vk::Format; 4] =
+    [vk::Format::R32G32B32_SFLOAT, vk::Format::R32G32B32_SFLOAT, vk::Format::R32G32_SFLOAT, vk::Format::R32G32B32A32_SFLOAT];
+
+/// One tangent of zero length, for all vertices of draws without.
+pub(crate) fn no_tangent(build: &mut Build<'_>) -> Result<Buffer> {
+    let (bytes, usage) = (NO_TANGENT.len() as u64, vk::BufferUsageFlags::VERTEX_BUFFER);
+    let mut buffer = Buffer::new(build, "no tangent", bytes, usage, Location::Upload)?;
+    buffer.bytes_mut().copy_from_slice(&NO_TANGENT);
+    Ok(buffer)
+}
+
 #[repr(C)]
 #[derive(Clone, Copy, Pod, Zeroable)]
 struct Push {
@@ -58,6 +70,34 @@ pub struct Draw {
     pub material: u32,
     /// The host's number for the object, below 65535; edges between objects are kept.
     pub object: u32,
+}
+
+impl Draw {
+    pub(crate) fn world_from_object(&self) -> Mat4 {
+        Mat4::from_cols_array(&self.world_from_object)
+    }
+
+    /// Columns that make world normals, up to length.
+    pub(crate) fn normal_from_object(&self) -> [[f32; 4]; 3] {
+        let normal = Mat3::from_mat4(self.world_from_object()).inverse().transpose();
+        normal.to_cols_array_2d().map(|[x, y, z]| [x, y, z, 0.0])
+    }
+
+    /// Draws it with the pipeline that is bound, which takes `push`. The rendering is open.
+    pub(crate) fn record<P: Pod>(&self, rec: &Recorder<'_>, layout: vk::PipelineLayout, push: &P, no_tangent: &Buffer) {
+        let stages = vk::ShaderStageFlags::VERTEX | vk::ShaderStageFlags::FRAGMENT;
+        let tangents = self.tangents.unwrap_or((no_tangent.handle, 0));
+        let streams = [self.positions, self.normals, self.coordinates, tangents];
+        let strides = [12, 12, 8, if self.tangents.is_some() { 16 } else { 0 }];
+        let device = &rec.cx.device;
+        // SAFETY: inside the rendering; the host promises that its buffers hold what `Draw` says.
+        unsafe {
+            device.cmd_push_constants(rec.cmd, layout, stages, 0, bytemuck::bytes_of(push));
+            device.cmd_bind_vertex_buffers2(rec.cmd, 0, &streams.map(|s| s.0), &streams.map(|s| s.1), None, Some(&strides));
+            device.cmd_bind_index_buffer(rec.cmd, self.indices.0, self.indices.1, vk::IndexType::UINT32);
+            device.cmd_draw_indexed(rec.cmd, self.index_count, 1, 0, 0, 0);
+        }
+    }
 }
 
 /// The G-buffer in the encoding of `glsl/bridge/gbuffer.glsl`.
@@ -103,7 +143,6 @@ pub(crate) struct Io<'a> {
 /// The pipeline, and set 0 for the passes that read the result.
 pub(crate) struct GBuffer {
     pipeline: RasterPipeline,
-    /// One tangent of zero length, for all vertices of draws without.
     no_tangent: Buffer,
     pub layout: vk::DescriptorSetLayout,
     sets: Sets,
@@ -111,16 +150,8 @@ pub(crate) struct GBuffer {
 
 impl GBuffer {
     pub fn new(p: &mut PassContext<'_, '_>) -> Result<Self> {
-        let streams = [
-            vk::Format::R32G32B32_SFLOAT,
-            vk::Format::R32G32B32_SFLOAT,
-            vk::Format::R32G32_SFLOAT,
-            vk::Format::R32G32B32A32_SFLOAT,
-        ];
-        let pipeline = RasterPipeline::new(p.build, p.modules, NAME, size_of::<Push>() as u32, &streams, &COLORS, DEPTH)?;
-        let mut no_tangent =
-            Buffer::new(p.build, "no tangent", NO_TANGENT.len() as u64, vk::BufferUsageFlags::VERTEX_BUFFER, Location::Upload)?;
-        no_tangent.bytes_mut().copy_from_slice(&NO_TANGENT);
+        let pipeline = RasterPipeline::new(p.build, p.modules, NAME, size_of::<Push>() as u32, &STREAMS, &COLORS, DEPTH)?;
+        let no_tangent = no_tangent(p.build)?;
         let layout = set_layout(p.build, vk::ShaderStageFlags::COMPUTE, &BRIDGE)?;
         let sets = Sets::new(p.build, layout, &BRIDGE, p.slots)?;
         Ok(Self { pipeline, no_tangent, layout, sets })
@@ -168,33 +199,16 @@ impl GBuffer {
             device.cmd_set_scissor(rec.cmd, 0, &[area]);
         }
         for draw in io.draws {
-            self.draw(rec, io, draw);
+            let push = Push {
+                clip_from_object: (io.clip_from_world * draw.world_from_object()).to_cols_array_2d(),
+                normal_from_object: draw.normal_from_object(),
+                id: [(draw.object << 16 | draw.material) + 1, 0, 0, 0],
+            };
+            draw.record(rec, self.pipeline.layout, &push, &self.no_tangent);
         }
         // SAFETY: closes the rendering begun above.
         unsafe { device.cmd_end_rendering(rec.cmd) };
         rec.end();
-    }
-
-    fn draw(&self, rec: &Recorder<'_>, io: &Io<'_>, draw: &Draw) {
-        let world = Mat4::from_cols_array(&draw.world_from_object);
-        let normal = Mat3::from_mat4(world).inverse().transpose();
-        let push = Push {
-            clip_from_object: (io.clip_from_world * world).to_cols_array_2d(),
-            normal_from_object: normal.to_cols_array_2d().map(|[x, y, z]| [x, y, z, 0.0]),
-            id: [(draw.object << 16 | draw.material) + 1, 0, 0, 0],
-        };
-        let stages = vk::ShaderStageFlags::VERTEX | vk::ShaderStageFlags::FRAGMENT;
-        let tangents = draw.tangents.unwrap_or((self.no_tangent.handle, 0));
-        let streams = [draw.positions, draw.normals, draw.coordinates, tangents];
-        let strides = [12, 12, 8, if draw.tangents.is_some() { 16 } else { 0 }];
-        let device = &rec.cx.device;
-        // SAFETY: inside the rendering; the host promises that its buffers hold what `Draw` says.
-        unsafe {
-            device.cmd_push_constants(rec.cmd, self.pipeline.layout, stages, 0, bytemuck::bytes_of(&push));
-            device.cmd_bind_vertex_buffers2(rec.cmd, 0, &streams.map(|s| s.0), &streams.map(|s| s.1), None, Some(&strides));
-            device.cmd_bind_index_buffer(rec.cmd, draw.indices.0, draw.indices.1, vk::IndexType::UINT32);
-            device.cmd_draw_indexed(rec.cmd, draw.index_count, 1, 0, 0, 0);
-        }
     }
 
     /// Set 0 of this slot over the images that `record` wrote, made ready to be sampled.

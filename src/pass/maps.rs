@@ -1,8 +1,8 @@
 //! Materials' textures on the device: layers of arrays by size and format, and where each material's maps are.
 
-use crate::config::{Filter, MOST_BASE_LOBES};
+use crate::config::{Bins, Filter, MOST_BASE_LOBES};
 use crate::distribution::effective::Rule;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::gpu::access::Access;
 use crate::gpu::buffer::Buffer;
 use crate::gpu::image::{Image, ImageDesc};
@@ -49,6 +49,8 @@ pub(crate) struct MapImages {
     /// Where each material's moments are.
     #[cfg_attr(not(feature = "offline"), expect(dead_code, reason = "only `offline` reads them back"))]
     moments: Vec<Option<MomentsPlace>>,
+    /// What goes into the cells of each material's objects.
+    divided: Vec<Option<Divided>>,
     /// Whether there are materials whose lobes stay as they are, whatever the filter.
     pub unfiltered: bool,
 }
@@ -60,6 +62,19 @@ pub(crate) struct MomentsPlace {
     pub cells: Option<(Place, usize)>,
 }
 
+/// What goes into the cells of a material's objects.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Divided {
+    /// Classes of its moments and of the cells, one of each for all materials of a size.
+    pub moments: usize,
+    pub cells: usize,
+    /// Of the moments.
+    pub size: [u32; 2],
+    pub lobes: vmf_mips::Lobes,
+    /// Of an object's cells.
+    pub layers: usize,
+}
+
 /// An array and layers of it: of moments and of cells.
 #[cfg(feature = "offline")]
 pub(crate) type MomentArrays<'a> = [Option<(&'a Image, std::ops::Range<u32>)>; 2];
@@ -67,6 +82,7 @@ pub(crate) type MomentArrays<'a> = [Option<(&'a Image, std::ops::Range<u32>)>; 2
 /// What textures and their moments are read with.
 pub(crate) struct Reading<'a> {
     pub filter: Filter,
+    pub bins: Bins,
     /// How a base lobe counts.
     pub rule: Rule,
     /// Whether the mesh's curvature widens lobes.
@@ -82,6 +98,7 @@ pub(crate) struct MapsUpload {
     classes: Vec<ImageUpload>,
     moments: Vec<Image>,
     places: Vec<Option<MomentsPlace>>,
+    divided: Vec<Option<Divided>>,
     unfiltered: bool,
     pub uses: Uses,
     pub work: Option<(brdf_map::Work, vmf_mips::Work)>,
@@ -127,7 +144,7 @@ fn upload(build: &mut Build<'_>, class: &Class) -> Result<ImageUpload> {
 }
 
 /// Where an array's layer is, as `MapRecord::places` has it.
-fn code(place: Option<Place>) -> u32 {
+pub(super) fn code(place: Option<Place>) -> u32 {
     place.map_or(0, |(class, layer)| (layer << 3 | class) as u32 + 1)
 }
 
@@ -139,12 +156,13 @@ struct GroupPlace {
 }
 
 /// The moments of `materials`, of which `bases` say what is filtered: one group for each size, and each material's place.
+/// Cells of objects are none of the group's.
 fn groups(
     materials: &[Material],
     bases: &[Option<Base>],
     sizes: Vec<[u32; 2]>,
     slots: &[Slots],
-    filter: Filter,
+    reading: &Reading<'_>,
 ) -> (Vec<Group>, Vec<Option<GroupPlace>>) {
     let mut groups: Vec<_> = sizes.into_iter().map(Group::new).collect();
     let mut place = |((material, base), slots): ((&Material, &Option<Base>), &Slots)| {
@@ -153,8 +171,9 @@ fn groups(
         let roughness = base.roughness(material).and(slots.roughness);
         let parameter = Parameter::of(&material.model);
         let source = Source { normal: slots.normal, roughness, rule: rule(material), base, parameter };
-        let layers = Layers::of(filter, &base);
-        Some(GroupPlace { group, first: groups.get_mut(group)?.place(source, layers), layers })
+        let layers = Layers::of(reading.filter, &base);
+        let cells = if reading.bins == Bins::Camera { 0 } else { layers.cells };
+        Some(GroupPlace { group, first: groups.get_mut(group)?.place(source, Layers { cells, ..layers }), layers })
     };
     let places = materials.iter().zip(bases).zip(slots).map(&mut place).collect();
     (groups, places)
@@ -174,18 +193,35 @@ impl MapsUpload {
             let texel = std::sync::Arc::new(crate::Texture::scalar([1, 1], &[0.0])?);
             classes.push(Class { size: [1, 1], format: Format::Half1, layers: vec![texel] });
         }
-        let (groups, places) = groups(materials, &bases, sizes, &slots, reading.filter);
-        // Cells are behind the moments of their group.
+        let (groups, places) = groups(materials, &bases, sizes, &slots, reading);
+        let camera = reading.bins == Bins::Camera;
+        // Cells are behind the moments of their group, those of objects behind all.
         let firsts: Vec<_> = groups
             .iter()
             .scan(classes.len(), |next, group| Some(std::mem::replace(next, *next + 1 + usize::from(group.layers.cells > 0))))
             .collect();
         let place = |GroupPlace { group, first, layers }: GroupPlace| {
             let class = *firsts.get(group)?;
-            let cells = (layers.cells > 0).then_some(((class + 1, first.cells), layers.cells));
+            let of_cells = if camera { classes.len() + groups.len() + group } else { class + 1 };
+            let cells = (layers.cells > 0).then_some(((of_cells, first.cells), layers.cells));
             Some(MomentsPlace { moments: ((class, first.moments), layers.moments), cells })
         };
         let places: Vec<_> = places.into_iter().map(|p| p.and_then(place)).collect();
+
+        let mut divided = Vec::new();
+        for (i, ((place, base), material)) in places.iter().zip(&bases).zip(materials).enumerate() {
+            let of_objects = place.filter(|_| camera).and_then(|p| Some((p.moments.0, p.cells?))).zip(*base);
+            let Some((((moments, first), ((cells, _), layers)), base)) = of_objects else {
+                divided.push(None);
+                continue;
+            };
+            if material.maps.tiling != [1.0; 2] {
+                let (field, got) = (format!("materials[{i}].maps.tiling"), format!("{:?}", material.maps.tiling));
+                return Err(Error::invalid(field, "[1.0, 1.0], as bins are camera", got));
+            }
+            let size = groups.get(moments - classes.len()).map_or([1; 2], |group| group.size);
+            divided.push(Some(Divided { moments, cells, size, lobes: vmf_mips::Lobes::of(&base, first), layers }));
+        }
 
         let (mut uses, mut unfiltered) = (Uses::default(), false);
         let mut records = Vec::with_capacity(materials.len());
@@ -223,27 +259,28 @@ impl MapsUpload {
         let classes = classes.iter().map(|class| upload(build, class)).collect::<Result<Vec<_>>>()?;
         let mut moments = Vec::new();
         for group in &groups {
-            moments.extend(group.images(build)?);
+            moments.extend(group.images(build, reading.filter)?);
         }
         let work = match reading.passes.filter(|_| !groups.is_empty()) {
             Some((map, mips)) => {
                 let images: Vec<_> = classes.iter().map(|c| &c.image).chain(&moments).collect();
                 let map = map.prepare(build, reading.samplers, &groups, &images, classes.len())?;
-                let mips = mips.prepare(build, &groups, &map, reading.filter)?;
+                let mips = mips.prepare(build, &groups, &map)?;
                 Some((map, mips))
             }
             None => None,
         };
         let usage = vk::BufferUsageFlags::STORAGE_BUFFER;
         let records = BufferUpload::new(build, "maps", usage, bytemuck::cast_slice(&records))?;
-        Ok(Self { records, classes, moments, places, unfiltered, uses, work })
+        Ok(Self { records, classes, moments, places, divided, unfiltered, uses, work })
     }
 
     pub fn record(self, rec: &mut Recorder<'_>, bag: &mut Retired) -> MapImages {
         let textures = self.classes.into_iter().map(|class| class.record(rec, bag));
         let mut classes: Vec<_> = textures.collect();
         classes.extend(self.moments);
-        MapImages { records: self.records.record(rec, bag), classes, moments: self.places, unfiltered: self.unfiltered }
+        let records = self.records.record(rec, bag);
+        MapImages { records, classes, moments: self.places, divided: self.divided, unfiltered: self.unfiltered }
     }
 }
 
@@ -255,6 +292,11 @@ impl MapImages {
     /// The array of class `i`, or of the last if there are not that many.
     pub fn class(&self, i: usize) -> &Image {
         &self.classes[i.min(self.classes.len() - 1)]
+    }
+
+    /// What goes into the cells of a material's objects, if these have some of their own.
+    pub fn divided(&self, material: u32) -> Option<&Divided> {
+        self.divided.get(material as usize)?.as_ref()
     }
 
     /// The arrays of a material's moments and of its cells, its first layer there and how many there are.

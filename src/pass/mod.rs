@@ -16,12 +16,14 @@ pub mod luminance;
 pub(crate) mod maps;
 pub mod materials;
 pub mod modules;
+pub(crate) mod object_cells;
 pub mod prefilter;
 #[cfg(feature = "offline")]
 pub(crate) mod probe;
 pub mod pyramid;
 pub mod resolve;
 pub mod shade;
+pub mod texture_space;
 pub mod tonemap;
 pub mod upsample;
 pub mod vmf_mips;

@@ -18,6 +18,8 @@ macro_rules! modules {
 modules! {
     "gbuffer.vert",
     "gbuffer.frag",
+    "texture_space.vert",
+    "texture_space.frag",
     "brdf_map.comp",
     "vmf_mips.cells.comp",
     "vmf_mips.comp",

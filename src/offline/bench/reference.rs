@@ -232,6 +232,7 @@ fn open(world: &World, base: &Settings, image: &Converged) -> Result<Session> {
     let config = Config {
         frames_in_flight: 1,
         filter: base.config.filter,
+        bins: base.config.bins,
         geometric: base.config.geometric,
         directions: image.directions,
         ..Config::new(image.extent)

@@ -15,7 +15,7 @@ use toml::Spanned;
 
 /// Checks a whole scene.
 pub(super) fn scene(source: &Source, file: &SceneFile) -> Result<()> {
-    let mut check = Check { source, later: Vec::new() };
+    let mut check = Check { source };
     match &file.camera {
         Some(camera) => check.camera(camera)?,
         None if file.objects.get_ref().iter().any(|object| object.get_ref().is_gltf()) => {}
@@ -39,18 +39,12 @@ pub(super) fn scene(source: &Source, file: &SceneFile) -> Result<()> {
     if let Some(animation) = &file.animation {
         check.animation(animation.get_ref(), file)?;
     }
-    check.settings(&file.settings)?;
-    match check.later.iter().min_by_key(|span| span.start) {
-        Some(first) => Err(source.not_yet(first)),
-        None => Ok(()),
-    }
+    check.settings(&file.settings)
 }
 
-/// The rules for single values, and what has been found that cannot be done yet.
+/// The rules for single values.
 pub(super) struct Check<'a> {
     pub(super) source: &'a Source,
-    /// Positions of keys that are right but cannot be done yet.
-    pub(super) later: Vec<Span>,
 }
 
 impl Check<'_> {

@@ -7,7 +7,7 @@ use crate::offline::animation::AnimatedWorld;
 use crate::offline::error::{At, Error, Result};
 use crate::offline::input;
 use crate::offline::world::World;
-use crate::{Config, Division};
+use crate::{Bins, Config, Division};
 use builtins::BUILTINS;
 use std::path::{Path, PathBuf};
 
@@ -16,12 +16,12 @@ mod bakes;
 mod builtins;
 mod check;
 mod format;
-mod later;
 mod lights;
 mod maps;
 mod materials;
 mod overrides;
 mod resolve;
+mod settings;
 mod source;
 
 pub use animation::MAX_FRAMES;
@@ -45,8 +45,7 @@ impl Scene {
     ///
     /// # Errors
     /// [`Error::File`] with the line of whatever is unknown, missing, of another type or out of range;
-    /// [`Error::Argument`] if an override brought it, or for a name that is neither; [`Error::NotSupportedYet`] for keys
-    /// that are right but beyond this version.
+    /// [`Error::Argument`] if an override brought it, or for a name that is neither.
     pub fn load(scene: &str, overrides: &[(String, String)]) -> Result<Self> {
         if let Some((name, text)) = BUILTINS.iter().find(|(name, _)| *name == scene) {
             return Self::parse(name, PathBuf::from(format!("<{name}>")), PathBuf::new(), text.to_string(), overrides);
@@ -110,6 +109,10 @@ impl Scene {
                 _ => base.combine,
             },
             eps: settings.eps.as_ref().map_or(base.eps, |v| *v.get_ref()),
+            bins: match settings.bins.as_ref().map(|v| v.get_ref().as_str()) {
+                Some("camera") => Bins::Camera,
+                _ => base.bins,
+            },
             anisotropy: settings.anisotropy.as_ref().map_or(base.anisotropy, |v| *v.get_ref() as u32),
             lod_bias: settings.lod_bias.as_ref().map_or(base.lod_bias, |v| *v.get_ref() as f32),
             division: match [&settings.eps0, &settings.eps1].map(|eps| eps.as_ref().map(|v| *v.get_ref())) {

@@ -47,15 +47,6 @@ impl Source {
         self.error_of(span, self.field(span), expected, got)
     }
 
-    /// That what stands at `span` is known but cannot be done yet.
-    pub(super) fn not_yet(&self, span: &Span) -> Error {
-        let place = match self.override_at(span) {
-            Some(_) => "--set".to_string(),
-            None => format!("{}:{}:", self.path.display(), self.line(span)),
-        };
-        Error::NotSupportedYet { what: format!("{place} {}", self.field(span)) }
-    }
-
     /// That the table at `span` lacks the key `name`; an empty span is the whole file.
     pub(super) fn missing(&self, span: &Span, name: &str, expected: &str) -> Error {
         let field = if span.is_empty() { String::new() } else { self.field(span) + "." };

@@ -1,7 +1,7 @@
-//! Rules for `[settings]`, of which this version cannot do some yet: their values are checked like all others.
+//! Rules for `[settings]`.
 
 use crate::offline::error::Result;
-use crate::offline::scene::check::{Check, span};
+use crate::offline::scene::check::Check;
 use crate::offline::scene::format::Settings;
 
 impl Check<'_> {
@@ -19,8 +19,6 @@ impl Check<'_> {
         self.each(&s.lmax, |c, v| c.require(*v.get_ref() <= 5, &v.span(), "a level from 0 to 5", v.get_ref()))?;
         self.each(&s.anisotropy, |c, v| c.number(v, "1 to 16", |v| (1.0..=16.0).contains(&v)))?;
         self.each(&s.lod_bias, |c, v| c.number(v, "-16 to 16", |v| v.abs() <= 16.0))?;
-        let all = [span(&s.bins)];
-        self.later.extend(all.into_iter().flatten());
         Ok(())
     }
 }
