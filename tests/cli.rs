@@ -92,7 +92,7 @@ fn every_documented_flag_works_or_is_not_supported_yet() {
         ("--spc", "auto 2.5"),
         ("--seed", "0 4294967295"),
         ("--frames", "0..3"),
-        ("--literal", "eq4 eq8 eq9"),
+        ("--literal", "eq4 eq8 eq9 xu"),
         ("--set", "camera.fov_y=40"),
         ("--reference", "16"),
         ("--stats", "stats.json"),
@@ -106,6 +106,7 @@ fn every_documented_flag_works_or_is_not_supported_yet() {
             let beside: &[&str] = match value {
                 _ if predicted => &["--rate", "bandwidth"],
                 "base" => &["--estimator", "preconvolved"],
+                "lobes" => &["--filter", "vmf"],
                 _ => &[],
             };
             let run = folder.render("furnace", &[&[flag, value, "-o", "out.exr"], beside].concat());
