@@ -10,6 +10,8 @@
 #include "moments.glsl"
 #include "found.glsl"
 #include "roughness.glsl"
+#include "look_up.glsl"
+#include "geometric.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
 
@@ -26,9 +28,6 @@ layout(constant_id = 6) const uint CELL_CLASSES = 0u;
 layout(constant_id = 7) const uint FILTER = 0u;
 // Layers of `lobes`; 0 where the filter has no lobes of its own.
 layout(constant_id = 8) const uint LOBES = 0u;
-// Most look-ups along the longer axis of a footprint, and what is added to their level.
-layout(constant_id = 9) const uint ANISOTROPY = 1u;
-layout(constant_id = 10) const float LOD_BIAS = 0.0;
 // Whether concentrations follow from lengths by the paper's equation 8, and the lengths below which cells are divided; 0 to go by
 // their spread.
 layout(constant_id = 11) const bool LITERAL = false;
@@ -54,124 +53,12 @@ struct MapRecord {
 layout(set = 2, binding = 1, std430) readonly buffer Maps {
     MapRecord maps[]; // by material
 };
-layout(set = 2, binding = 2) uniform sampler2DArray textures_0;
-layout(set = 2, binding = 3) uniform sampler2DArray textures_1;
-layout(set = 2, binding = 4) uniform sampler2DArray textures_2;
-layout(set = 2, binding = 5) uniform sampler2DArray textures_3;
-layout(set = 2, binding = 6) uniform sampler2DArray textures_4;
-layout(set = 2, binding = 7) uniform sampler2DArray textures_5;
-layout(set = 2, binding = 8) uniform sampler2DArray textures_6;
-layout(set = 2, binding = 9) uniform sampler2DArray textures_7;
 layout(set = 2, binding = 10, rgba32f) uniform writeonly image2D normals;   // shading normal; tangent as tangent.glsl encodes it
 layout(set = 2, binding = 11, rgba32ui) uniform writeonly uimage2D factors; // as factors.glsl packs them
 layout(set = 2, binding = 12, rgba32ui) uniform writeonly uimage2DArray lobes; // as found.glsl packs them
 layout(set = 2, binding = 13, std430) readonly buffer Objects {
     uint objects[]; // in camera space, by object: its cells, as `MapRecord::cells`
 };
-
-// What a pixel covers of a map: look-ups along the longer axis, at a level whose texels are as large as the step from one to the
-// next; with one look-up, as large as the longer axis.
-struct Reach {
-    vec2 size; // of the map
-    vec2 axis;
-    float taps;
-    float level;
-};
-
-#define SIZE(i) \
-    if ((classes & (1u << i)) != 0u) { \
-        size = slot == i ? vec2(textureSize(textures_##i, 0).xy) : size; \
-    }
-Reach reach_of(uint classes, uint code, vec4 footprint) {
-    int slot = (int(code) - 1) & 7;
-    vec2 size = vec2(1.0);
-    SIZE(0)
-    SIZE(1)
-    SIZE(2)
-    SIZE(3)
-    SIZE(4)
-    SIZE(5)
-    SIZE(6)
-    SIZE(7)
-    vec2 x = footprint.xy * size, y = footprint.zw * size;
-    float xx = dot(x, x), yy = dot(y, y), major = max(max(xx, yy), 1.0), minor = max(min(xx, yy), 1.0);
-    float taps = clamp(ceil(sqrt(major / minor) - 1e-3), 1.0, float(ANISOTROPY));
-    return Reach(size, xx > yy ? footprint.xy : footprint.zw, taps, max(0.5 * log2(max(major / (taps * taps), 1.0)) + LOD_BIAS, 0.0));
-}
-
-// Where look-up i is taken.
-vec2 reach_tap(Reach r, vec2 uv, float i) {
-    return uv + r.axis * ((i + 0.5) / r.taps - 0.5);
-}
-
-// A map's value, of `layer` after its own, at a level. Textures count rows from the top, coordinates upwards.
-#define FETCH(i) \
-    if ((classes & (1u << i)) != 0u) { \
-        vec4 fetched = textureLod(textures_##i, at, level); \
-        value = slot == i ? fetched : value; \
-    }
-vec4 fetch(uint classes, uint code, uint layer, vec2 uv, float level) {
-    bool none = code == 0u;
-    int slot = none ? -1 : (int(code) - 1) & 7;
-    vec3 at = none ? vec3(0.0) : vec3(uv.x, 1.0 - uv.y, float((code - 1u >> 3) + layer));
-    vec4 value = vec4(0.0);
-    FETCH(0)
-    FETCH(1)
-    FETCH(2)
-    FETCH(3)
-    FETCH(4)
-    FETCH(5)
-    FETCH(6)
-    FETCH(7)
-    return value;
-}
-
-// The mean over what a pixel covers.
-vec4 look_up(uint classes, uint code, uint layer, vec2 uv, Reach r) {
-    vec4 sum = fetch(classes, code, layer, reach_tap(r, uv, 0.0), r.level);
-    for (float i = 1.0; ANISOTROPY != 1u && i < r.taps; ++i) {
-        sum += fetch(classes, code, layer, reach_tap(r, uv, i), r.level);
-    }
-    return sum / r.taps;
-}
-
-vec3 colour(uint classes, uint code, vec2 uv, vec4 footprint, float without) {
-    vec3 value = look_up(classes, code, 0u, uv, reach_of(classes, code, footprint)).rgb;
-    return code == 0u ? vec3(without) : value;
-}
-
-// Isotropic filtering of normal distributions by the derivatives of interpolated normals (Tokuyoshi and Kaplanyan 2021,
-// "Stable geometric specular antialiasing with projected-space NDF filtering", listing 5): twice the variance of the normal
-// within a pixel filter of variance 1/(2 pi), at most 0.18.
-const float FILTER_VARIANCE = 0.5 * INV_PI;
-const float MOST_KERNEL = 0.18;
-
-// The normal's change over one sample along an axis: central where both neighbours are of the same surface.
-vec3 normal_change(ivec2 p, ivec2 axis, vec3 n, float depth, uint object, float reach) {
-    vec3 sum = vec3(0.0);
-    float steps = 0.0;
-    for (int side = -1; side <= 1; side += 2) {
-        ivec2 q = p + axis * side;
-        bool inside = all(greaterThanEqual(q, ivec2(0))) && all(lessThan(q, ivec2(frame.extent.xy)));
-        q = inside ? q : p;
-        bool same = inside && gbuffer_covered(q) && gbuffer_object(q) == object && abs(gbuffer_depth(q) - depth) <= reach;
-        sum += same ? (gbuffer_normal(q) - n) * float(side) : vec3(0.0);
-        steps += same ? 1.0 : 0.0;
-    }
-    return sum / max(steps, 1.0);
-}
-
-float geometric_kernel(ivec2 p, vec3 n) {
-    float depth = gbuffer_depth(p);
-    uint object = gbuffer_object(p);
-    // As far as a plane of this tilt changes in depth over a few samples.
-    float facing = max(abs(dot(n, normalize(frame_ray(p)))), 0.02);
-    float footprint = depth * max(abs(frame.ray.x) * 2.0 / float(frame.extent.x), abs(frame.ray.y) * 2.0 / float(frame.extent.y));
-    float reach = 4.0 * footprint / facing;
-    vec3 x = normal_change(p, ivec2(1, 0), n, depth, object, reach);
-    vec3 y = normal_change(p, ivec2(0, 1), n, depth, object, reach);
-    return min(2.0 * FILTER_VARIANCE * (dot(x, x) + dot(y, y)), MOST_KERNEL);
-}
 
 // A sample's lobes as they are found.
 struct Found {

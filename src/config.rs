@@ -1,6 +1,6 @@
 //! What a renderer is built for. Everything here is fixed until [`crate::Renderer::resize`] or a new renderer.
 
-use crate::distribution;
+use crate::distribution::{Division, Filter};
 use crate::error::{Error, Result};
 use crate::frequency::allocation::Allocation;
 use crate::frequency::environment::EPS;
@@ -47,111 +47,6 @@ pub enum Rate {
     Luminance,
 }
 
-/// How a material is read at a pixel's scale. Filters that read normals and roughness through mips make lobes of them, in the place
-/// of the model's own: of GGX, Blinn-Phong and vMF lobes about the normal each one a facet, with its direction for a normal; of
-/// mixtures of at most [`MOST_BASE_LOBES`] other vMF lobes one distribution of normals. Tables and larger mixtures keep their lobes,
-/// about the mean normal ([`crate::Moments`]).
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Filter {
-    /// At the pixel's centre: colours through their mips, normals and roughness as they are there.
-    #[default]
-    Point,
-    /// The same, with lobes widened by how far the interpolated normal turns within the pixel: geometric specular antialiasing
-    /// (Tokuyoshi and Kaplanyan 2021). Tabulated reflectances stay as they are.
-    Tk,
-    /// Normals and concentrations each averaged over the pixel, through their mips.
-    Naive,
-    /// Normals averaged over the pixel; the concentration is the map's mean.
-    Fixed,
-    /// The mean concentration, reduced by the length of the mean normal (Toksvig 2005, "Mipmapping Normal Maps"); a material's
-    /// lobes count as one.
-    Toksvig,
-    /// The same for each of a material's lobes.
-    ToksvigLobe,
-    /// Mean and covariance of slopes (Olano and Baker 2010, "LEAN Mapping"); a material's lobes count as one.
-    Lean,
-    /// The same for each of a material's lobes.
-    LeanLobe,
-    /// As [`Filter::Lean`], with the masking that follows from these moments (Dupuy et al. 2013).
-    Leadr,
-    /// One von Mises-Fisher lobe of the pixel's mean vector (Xu et al. 2017).
-    Vmf1,
-    /// One in each quadrant of directions about the surface's normal.
-    Vmf4,
-    /// One in each of eight cells of these directions.
-    Vmf8,
-    /// As many of these cells as the spread within them asks for.
-    Vmf,
-}
-
-impl Filter {
-    /// All.
-    pub const ALL: [Self; 13] = [
-        Self::Point,
-        Self::Tk,
-        Self::Naive,
-        Self::Fixed,
-        Self::Toksvig,
-        Self::ToksvigLobe,
-        Self::Lean,
-        Self::LeanLobe,
-        Self::Leadr,
-        Self::Vmf1,
-        Self::Vmf4,
-        Self::Vmf8,
-        Self::Vmf,
-    ];
-
-    /// The name by which it is asked for.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Point => "point",
-            Self::Tk => "tk",
-            _ => self.stored().map_or("", distribution::Filter::name),
-        }
-    }
-
-    /// What it stores in a map's texels, if it reads normals and roughness through their mips.
-    pub fn stored(self) -> Option<distribution::Filter> {
-        use distribution::Filter as Stored;
-        match self {
-            Self::Point | Self::Tk => None,
-            Self::Naive => Some(Stored::Naive),
-            Self::Fixed => Some(Stored::Fixed),
-            Self::Toksvig => Some(Stored::Toksvig),
-            Self::ToksvigLobe => Some(Stored::ToksvigLobe),
-            Self::Lean => Some(Stored::Lean),
-            Self::LeanLobe => Some(Stored::LeanLobe),
-            Self::Leadr => Some(Stored::Leadr),
-            Self::Vmf1 => Some(Stored::Vmf1),
-            Self::Vmf4 => Some(Stored::Vmf4),
-            Self::Vmf8 => Some(Stored::Vmf8),
-            Self::Vmf => Some(Stored::Vmf),
-        }
-    }
-
-    /// Whether it stores cells of directions beside lobes.
-    pub(crate) fn has_cells(self) -> bool {
-        matches!(self, Self::Vmf4 | Self::Vmf8 | Self::Vmf)
-    }
-
-    /// Layers of the image of a sample's lobes: one a lobe, two a Gaussian of slopes; none if it makes no lobes.
-    pub(crate) fn lobe_layers(self) -> u32 {
-        let lobes = MOST_BASE_LOBES as u32;
-        match self {
-            Self::Point | Self::Tk => 0,
-            Self::Naive | Self::Fixed | Self::ToksvigLobe => lobes,
-            Self::Toksvig | Self::Vmf1 => 1,
-            Self::Lean | Self::Leadr => 2,
-            Self::LeanLobe => 2 * lobes,
-            Self::Vmf4 => 4,
-            Self::Vmf8 => 8,
-            // One cell, its four parts and their eight, where it blends between them.
-            Self::Vmf => 13,
-        }
-    }
-}
-
 /// The frame whose cells of directions filters with cells gather lobes in. Lobes of one cell become one.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Bins {
@@ -176,27 +71,6 @@ impl Bins {
         }
     }
 }
-
-/// When [`Filter::Vmf`] divides a cell.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub enum Division {
-    /// By how far its spread goes beyond that of the lobes in it, with a blend from one to the other.
-    #[default]
-    SpreadRatio,
-    /// Where the mean vector of all, and then of a quarter, is shorter than this (epsilon 0 and 1 of Xu et al. 2017, Algorithm 1).
-    Lengths([f64; 2]),
-}
-
-/// As printed.
-pub const PRINTED_LENGTHS: [f64; 2] = [0.95, 0.85];
-
-impl Division {
-    /// By [`PRINTED_LENGTHS`].
-    pub const PRINTED: Self = Self::Lengths(PRINTED_LENGTHS);
-}
-
-/// Lobes of a material that filters take apart.
-pub const MOST_BASE_LOBES: usize = 4;
 
 /// Where the G-buffer comes from.
 #[derive(Clone, Copy, Debug, Default)]
@@ -307,7 +181,7 @@ impl Config {
 
     /// Whether normals and lobes make one as the paper of the filter has it.
     pub(crate) fn takes_lobes_literally(&self) -> bool {
-        self.literal_lobes && self.filter.stored().is_some_and(distribution::Filter::is_vmf)
+        self.literal_lobes && self.filter.is_vmf()
     }
 
     /// Samples a side of the blocks that the prediction works on: 2x2 pixels.

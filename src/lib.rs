@@ -25,7 +25,8 @@ pub mod texture;
 mod view;
 
 pub use ash;
-pub use config::{Bins, Config, Division, Estimator, Filter, GBufferSource, Rate};
+pub use config::{Bins, Config, Estimator, GBufferSource, Rate};
+pub use distribution::{Division, Filter};
 pub use error::{Error, Result};
 pub use frame::{EnvironmentUse, FrameInputs, GBufferInput, Output};
 pub use glam;

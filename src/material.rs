@@ -6,7 +6,7 @@ use crate::error::{Error, Result};
 use crate::frequency::wavelet::Grid;
 use crate::frequency::{TextureBandwidth, TextureCells};
 use crate::moments::Moments;
-use crate::reflectance::half_row::{self, Rows};
+use crate::reflectance::half_row::Rows;
 use crate::reflectance::{BlinnPhong, Ggx, LobeBandwidth, Model, Reflectance};
 use crate::texture::{Format, Texture};
 use glam::{DVec2, DVec3};
@@ -266,7 +266,7 @@ impl PointMaterial {
     /// `model` as the maps make it. Albedos and reflectances at normal incidence are clamped to 1 where the model's are at most
     /// that.
     pub fn reflectance(&self, model: &Model) -> PointReflectance {
-        let plain = |model| PointReflectance { model, scale: DVec3::ONE, base: DVec3::ZERO, surface: None };
+        let plain = |model| PointReflectance::Plain { model, scale: DVec3::ONE, base: DVec3::ZERO };
         let at_most_one = |c: DVec3| c.clamp(DVec3::ZERO, DVec3::ONE);
         let albedo = |c: DVec3| at_most_one(c * self.albedo);
         let specular = |c: DVec3| at_most_one(c * self.specular);
@@ -279,8 +279,7 @@ impl PointMaterial {
                 other => other.clone(),
             };
             let found = found.as_ref().clone().widened(self.kernel);
-            let surface = Surface::new(coloured.clone(), &found, self.specular, albedo(DVec3::ONE));
-            return PointReflectance { surface: Some(surface), ..plain(coloured) };
+            return PointReflectance::Found(Surface::new(coloured, &found, self.specular, albedo(DVec3::ONE)));
         }
         match model {
             Model::Ggx(g) => {
@@ -294,7 +293,7 @@ impl PointMaterial {
                     if self.kernel > 0.0 { 2.0 / (2.0 / (exponent + 2.0) + self.kernel).min(1.0) - 2.0 } else { exponent };
                 plain(Model::BlinnPhong(BlinnPhong { exponent, specular: specular(b.specular), albedo: albedo(b.albedo) }))
             }
-            Model::Vmf(vmf) => PointReflectance {
+            Model::Vmf(vmf) => PointReflectance::Plain {
                 model: match self.roughness {
                     None if self.kernel > 0.0 => Model::Vmf(Arc::new(vmf.widened(self.kernel))),
                     None => model.clone(),
@@ -302,56 +301,65 @@ impl PointMaterial {
                 },
                 scale: self.specular,
                 base: albedo(DVec3::ONE),
-                surface: None,
             },
-            Model::Table(_) | Model::Turned(_) => PointReflectance { scale: self.albedo, ..plain(model.clone()) },
+            Model::Table(_) | Model::Turned(_) => {
+                PointReflectance::Plain { model: model.clone(), scale: self.albedo, base: DVec3::ZERO }
+            }
         }
     }
 }
 
-/// A reflectance at one point of a surface: a model, scaled, over a diffuse base; or what a filter found of it.
+/// A reflectance at one point of a surface.
 #[derive(Clone, Debug)]
-pub struct PointReflectance {
-    model: Model,
-    scale: DVec3,
-    base: DVec3,
-    surface: Option<Surface>,
+pub enum PointReflectance {
+    /// A model, scaled, over a diffuse base.
+    Plain {
+        /// With the colours and the parameter of its maps.
+        model: Model,
+        /// Factor on it.
+        scale: DVec3,
+        /// Albedo below.
+        base: DVec3,
+    },
+    /// What a filter found of it.
+    Found(Surface),
 }
 
-impl PointReflectance {
-    fn with(&self, wi: DVec3, wo: DVec3, value: DVec3) -> DVec3 {
-        let above = wi.z > 0.0 && wo.z > 0.0;
-        value * self.scale + if above { self.base / PI } else { DVec3::ZERO }
-    }
+/// `value` of a model, scaled, over a diffuse base.
+fn over(scale: DVec3, base: DVec3, wi: DVec3, wo: DVec3, value: DVec3) -> DVec3 {
+    let above = wi.z > 0.0 && wo.z > 0.0;
+    value * scale + if above { base / PI } else { DVec3::ZERO }
 }
 
 impl Reflectance for PointReflectance {
     fn evaluate(&self, wi: DVec3, wo: DVec3) -> DVec3 {
-        match &self.surface {
-            Some(surface) => surface.evaluate(wi, wo),
-            None => self.with(wi, wo, self.model.evaluate(wi, wo)),
+        match self {
+            Self::Plain { model, scale, base } => over(*scale, *base, wi, wo, model.evaluate(wi, wo)),
+            Self::Found(surface) => surface.evaluate(wi, wo),
         }
     }
 
     fn isotropic(&self) -> bool {
-        self.surface.is_none() && self.model.isotropic()
+        matches!(self, Self::Plain { model, .. } if model.isotropic())
     }
 
     fn mean_over_turns(&self, wi: DVec3, wo: DVec3) -> DVec3 {
-        match &self.surface {
-            Some(surface) => surface.mean_over_turns(wi, wo),
-            None => self.with(wi, wo, self.model.mean_over_turns(wi, wo)),
+        match self {
+            Self::Plain { model, scale, base } => over(*scale, *base, wi, wo, model.mean_over_turns(wi, wo)),
+            Self::Found(surface) => surface.mean_over_turns(wi, wo),
         }
     }
 
     fn rows(&self, weights: DVec3) -> Rows<'_> {
-        if self.surface.is_some() {
-            return half_row::one_by_one(self, weights);
+        match self {
+            Self::Plain { model, scale, base } => {
+                let (model, base) = (model.rows(weights * *scale), weights.dot(*base) / PI);
+                Box::new(move |row, out| {
+                    model(row, out);
+                    out.iter_mut().for_each(|value| *value += base);
+                })
+            }
+            Self::Found(surface) => surface.rows(weights),
         }
-        let (model, base) = (self.model.rows(weights * self.scale), weights.dot(self.base) / PI);
-        Box::new(move |row, out| {
-            model(row, out);
-            out.iter_mut().for_each(|value| *value += base);
-        })
     }
 }

@@ -1,11 +1,10 @@
 //! What the filters that read through mips make of a material's normals and roughness, in f64: twin of the passes `brdf_map` and
 //! `vmf_mips` and of what `filter` decodes.
 
-use crate::config::{Division, Filter, MOST_BASE_LOBES};
 use crate::distribution::brdf_map::UPRIGHT;
 use crate::distribution::effective::{self, Rule};
 use crate::distribution::surface::FoundLobes;
-use crate::distribution::{BrdfMap, Filtered, Mixture};
+use crate::distribution::{BrdfMap, Division, Filter, Filtered, MOST_BASE_LOBES, Mixture};
 use crate::material::{LEAST_ALPHA, Maps, Material, Reach};
 use crate::reflectance::{Ggx, Lobe, Model};
 use crate::texture::Texture;
@@ -121,7 +120,7 @@ impl Parameter {
 /// The lobes at each place of a material, at each scale.
 #[derive(Clone, Debug)]
 pub struct Moments {
-    filter: crate::distribution::Filter,
+    filter: Filter,
     lobes: Option<Filtered<'static>>,
     /// The mean normal, where lobes are not about it.
     normals: Option<Filtered<'static>>,
@@ -133,13 +132,15 @@ impl Moments {
     /// Those that `filter` reads of a valid material; `None` for filters that read no mips of normals, and for materials without
     /// a map to filter. `literal` is [`crate::Config::literal_lobes`].
     pub fn of(material: &Material, filter: Filter, division: Division, literal: bool) -> Option<Self> {
-        let filter = filter.stored()?;
+        if !filter.stores() {
+            return None;
+        }
         let literal = literal && filter.is_vmf();
         let rule = if literal { Rule::Literal } else { Rule::Exact };
         let base = Base::of(material, rule)?;
         let size = base.size(material);
         let keep = |material: &Material, filter, rule| {
-            Some(Filtered::keeping(filter, BrdfMap::of(material, size, rule).ok()?, literal).divided(division))
+            Some(Filtered::keeping(filter, BrdfMap::of(material, size, rule).ok()?, literal)?.divided(division))
         };
         let lobes = if base == Base::Normals { None } else { Some(keep(material, filter, rule)?) };
         let normals = if base.upright() {
@@ -147,7 +148,7 @@ impl Moments {
         } else {
             let model = Model::Ggx(Ggx { alpha: LEAST_ALPHA, f0: DVec3::ONE, albedo: DVec3::ZERO });
             let maps = Maps { normal: material.maps.normal.clone(), ..Maps::default() };
-            Some(keep(&Material::new(model, maps), crate::distribution::Filter::Naive, Rule::Exact)?)
+            Some(keep(&Material::new(model, maps), Filter::Naive, Rule::Exact)?)
         };
         Some(Self { filter, lobes, normals, size, facing: base.facing() })
     }

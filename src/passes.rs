@@ -65,9 +65,9 @@ impl Passes {
                 .then(|| environment_bandwidth::EnvironmentBandwidth::new(&mut p, config.eps))
                 .transpose()?,
             prefilter: looked_up.then(|| prefilter::Prefilter::new(&mut p)).transpose()?,
-            moments: match config.filter.stored() {
-                Some(_) => Some((brdf_map::BrdfMap::new(&mut p, config)?, vmf_mips::VmfMips::new(&mut p, config)?)),
-                None => None,
+            moments: match config.filter.stores() {
+                true => Some((brdf_map::BrdfMap::new(&mut p, config)?, vmf_mips::VmfMips::new(&mut p, config)?)),
+                false => None,
             },
             texture_space: (config.bins == Bins::Camera).then(|| texture_space::TextureSpace::new(&mut p)).transpose()?,
             gbuffer,

@@ -14,18 +14,18 @@
 #define MOMENTS_GLSL
 #include "vmf.glsl"
 
-// In the order of src/distribution/filter.rs.
-const uint FILTER_NAIVE = 0u;
-const uint FILTER_FIXED = 1u;
-const uint FILTER_TOKSVIG = 2u;
-const uint FILTER_TOKSVIG_LOBE = 3u;
-const uint FILTER_LEAN = 4u;
-const uint FILTER_LEAN_LOBE = 5u;
-const uint FILTER_LEADR = 6u;
-const uint FILTER_VMF1 = 7u;
-const uint FILTER_VMF4 = 8u;
-const uint FILTER_VMF8 = 9u;
-const uint FILTER_VMF = 10u;
+// In the order of src/distribution/filter.rs, after those that store nothing.
+const uint FILTER_NAIVE = 2u;
+const uint FILTER_FIXED = 3u;
+const uint FILTER_TOKSVIG = 4u;
+const uint FILTER_TOKSVIG_LOBE = 5u;
+const uint FILTER_LEAN = 6u;
+const uint FILTER_LEAN_LOBE = 7u;
+const uint FILTER_LEADR = 8u;
+const uint FILTER_VMF1 = 9u;
+const uint FILTER_VMF4 = 10u;
+const uint FILTER_VMF8 = 11u;
+const uint FILTER_VMF = 12u;
 
 // What a concentration is of.
 const uint LOBES_STAY = 0u;     // nothing: the material's own lobes stay

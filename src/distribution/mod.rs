@@ -9,6 +9,7 @@ pub mod brdf_map;
 pub mod chart;
 pub mod effective;
 pub mod filter;
+pub mod filtered;
 pub mod literal;
 pub mod mip;
 pub mod mixture;
@@ -21,7 +22,8 @@ pub mod surface;
 pub mod vmf;
 
 pub use brdf_map::BrdfMap;
-pub use filter::{Filter, Filtered};
+pub use filter::{Division, Filter, MOST_BASE_LOBES};
+pub use filtered::Filtered;
 pub use mixture::Mixture;
 pub use partition::Cells;
 pub use surface::Surface;

@@ -3,12 +3,13 @@
 use crate::error::Result;
 use crate::gpu::context::VkResultExt;
 use crate::gpu::pipeline::{MAIN, Modules};
+use crate::gpu::recorder::Recorder;
 use crate::gpu::retire::{Build, Handle, Retired};
 use ash::vk;
 
 /// A graphics pipeline for dynamic rendering with per-pass push constants and no descriptors.
 pub(crate) struct RasterPipeline {
-    pub pipeline: vk::Pipeline,
+    pipeline: vk::Pipeline,
     pub layout: vk::PipelineLayout,
 }
 
@@ -98,6 +99,36 @@ impl RasterPipeline {
         build.track(pipeline, Handle::Pipeline);
         build.cx.name(pipeline, name);
         Ok(Self { pipeline, layout })
+    }
+
+    /// Opens a rendering over all of `extent` with this pipeline; the attachments are ready. [`Self::end`] closes it.
+    pub fn begin(
+        &self,
+        rec: &Recorder<'_>,
+        [width, height]: [u32; 2],
+        colors: &[vk::RenderingAttachmentInfo<'_>],
+        depth: Option<&vk::RenderingAttachmentInfo<'_>>,
+    ) {
+        let area = vk::Rect2D { extent: vk::Extent2D { width, height }, ..Default::default() };
+        let mut info = vk::RenderingInfo::default().render_area(area).layer_count(1).color_attachments(colors);
+        if let Some(depth) = depth {
+            info = info.depth_attachment(depth);
+        }
+        let viewport = vk::Viewport { width: width as f32, height: height as f32, max_depth: 1.0, ..Default::default() };
+        let device = &rec.cx.device;
+        // SAFETY: the command buffer is recording; attachments are ready, as the caller promises; dynamic state is all set.
+        unsafe {
+            device.cmd_begin_rendering(rec.cmd, &info);
+            device.cmd_bind_pipeline(rec.cmd, vk::PipelineBindPoint::GRAPHICS, self.pipeline);
+            device.cmd_set_viewport(rec.cmd, 0, &[viewport]);
+            device.cmd_set_scissor(rec.cmd, 0, &[area]);
+        }
+    }
+
+    /// Closes it.
+    pub fn end(&self, rec: &Recorder<'_>) {
+        // SAFETY: closes the rendering that `begin` opened.
+        unsafe { rec.cx.device.cmd_end_rendering(rec.cmd) };
     }
 
     pub fn retire(self, bag: &mut Retired) {

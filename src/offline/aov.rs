@@ -188,7 +188,7 @@ impl Aov {
                 }
                 let (bytes, ..) = session.image("lobes")?;
                 let texels: Vec<[u32; 4]> = bytemuck::pod_collect_to_vec(&bytes);
-                let slopes = config.filter.stored().is_some_and(crate::distribution::Filter::has_slopes);
+                let slopes = config.filter.has_slopes();
                 // The first that is all 0 ends the list; a Gaussian of slopes takes two layers.
                 let (samples, layers) = (covered.words.len(), if slopes { 2 } else { 1 });
                 let there = |i: usize, layer: usize| texels.get(layer * samples + i).is_some_and(|t| *t != [0; 4]);

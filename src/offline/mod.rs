@@ -25,6 +25,7 @@ pub mod render;
 pub mod scene;
 pub mod sequence;
 pub mod session;
+mod shown;
 pub mod stats;
 pub mod supersample;
 pub mod texture;

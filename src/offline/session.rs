@@ -1,9 +1,10 @@
 //! A world on a device: uploaded once, rendered frame by frame, read back.
 
+use crate::Config;
 use crate::distribution::chart;
-use crate::gpu::access::{Access, ImageRef};
+use crate::gpu::access::Access;
 use crate::gpu::buffer::Buffer;
-use crate::gpu::image::{Image, ImageDesc};
+use crate::gpu::image::ImageDesc;
 use crate::gpu::memory::Location;
 use crate::gpu::pipeline::{BridgeLayouts, Modules};
 use crate::gpu::recorder::{Recorder, States};
@@ -16,14 +17,14 @@ use crate::offline::lobe_cache;
 use crate::offline::mesh_buffers::MeshBuffers;
 pub use crate::offline::read_back::MomentLevels;
 use crate::offline::read_back::copy_buffer;
+use crate::offline::shown::Shown;
 use crate::offline::window::{Window, near};
-use crate::offline::world::{Camera, World};
+use crate::offline::world::World;
 use crate::pass::PassContext;
 use crate::pass::probe::Probe;
 use crate::plan::Levels;
 use crate::renderer::Renderer;
 use crate::sampling::LatLong;
-use crate::{Config, Draw, EnvironmentUse, FrameInputs, GBufferInput, Light, View};
 use ash::vk;
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -31,55 +32,6 @@ use std::time::Instant;
 
 /// The set-up time of uploading meshes.
 const MESHES: &str = "meshes";
-
-/// What every frame of the session shows.
-struct Shown {
-    camera: Camera,
-    near: f64,
-    view: View,
-    draws: Vec<Draw>,
-    environment: EnvironmentUse,
-    lights: Vec<Light>,
-    levels: Option<Image>,
-}
-
-impl Shown {
-    /// The world without its objects, which are uploaded one by one.
-    fn of(world: &World, extent: [u32; 2]) -> Self {
-        // Without an environment nothing is spent on sampling one.
-        let none = EnvironmentUse { intensity: 0.0, ..EnvironmentUse::default() };
-        let environment = world.environment.as_ref().map_or(none, |e| EnvironmentUse {
-            intensity: e.intensity as f32,
-            rotation: e.rotation as f32,
-            visible: e.visible,
-        });
-        let (camera, near) = (world.camera, near(world));
-        Self {
-            camera,
-            near,
-            view: Window::whole(extent).view(&camera, near),
-            draws: Vec::new(),
-            environment,
-            lights: world.lights.clone(),
-            levels: None,
-        }
-    }
-
-    fn inputs(&self, seed: [u32; 2]) -> FrameInputs<'_> {
-        let Self { view, draws, environment, lights, levels, .. } = self;
-        let frame = FrameInputs::new(0, *view, GBufferInput::Draws(draws));
-        let levels = levels.as_ref().map(|image| ImageRef {
-            image: image.handle,
-            view: image.view,
-            format: image.desc.format,
-            extent: image.extent(),
-            aspect: image.desc.aspect(),
-            entry: Access::COMPUTE_SAMPLED,
-            exit: Access::COMPUTE_SAMPLED,
-        });
-        FrameInputs { environment: *environment, lights, seed, levels, ..frame }
-    }
-}
 
 /// Milliseconds of set-up work by name.
 pub type SetupTimes = Vec<(&'static str, f64)>;

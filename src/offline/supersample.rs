@@ -12,7 +12,8 @@
 //! position is one sub-sample. Each area light takes one direction more at each position.
 
 use crate::Rate;
-use crate::config::{Config, Estimator, Filter};
+use crate::config::{Config, Estimator};
+use crate::distribution::Filter;
 use crate::frequency::allocation::Allocation;
 use crate::offline::bench::quality::{self, Frame, Noise};
 use crate::offline::error::{Error, Result};

@@ -1,8 +1,9 @@
 //! Pass 0b, continued: the lobes of each texel of a material's maps, as the filters store them (Xu et al. 2017, section 4;
 //! [`crate::moments`] is the f64 twin). Once a set of materials.
 
-use crate::config::{Config, Filter, MOST_BASE_LOBES};
-use crate::distribution::{self, vmf};
+use crate::config::Config;
+use crate::distribution::filter::Storage;
+use crate::distribution::{Cells, Filter, MOST_BASE_LOBES, vmf};
 use crate::error::Result;
 use crate::gpu::access::Access;
 use crate::gpu::image::{Image, ImageDesc};
@@ -53,8 +54,7 @@ struct Push {
 
 /// The number by which `glsl/include/moments.glsl` knows a filter.
 pub(crate) fn number(filter: Filter) -> u32 {
-    let stored = filter.stored();
-    distribution::Filter::ALL.iter().position(|known| Some(*known) == stored).unwrap_or_default() as u32
+    filter as u32
 }
 
 /// What a concentration is of: LOBES_* of `glsl/include/moments.glsl`.
@@ -91,15 +91,12 @@ pub(crate) struct Layers {
 impl Layers {
     /// As `glsl/include/moments.glsl` says.
     pub fn of(filter: Filter, base: &Base) -> Self {
-        use distribution::Filter as F;
         let count = base.lobes().len();
-        let (merged, each, cells) = match filter.stored() {
-            Some(F::Naive | F::Fixed | F::ToksvigLobe) | None => (false, 1, 0),
-            Some(F::Toksvig | F::Vmf1) => (true, 1, 0),
-            Some(F::Lean | F::Leadr) => (true, 2, 0),
-            Some(F::LeanLobe) => (false, 2, 0),
-            Some(F::Vmf4) => (false, 1, 4),
-            Some(F::Vmf8 | F::Vmf) => (false, 1, 8),
+        let (merged, each, cells) = match filter.storage() {
+            None | Some(Storage::Cells(Cells::One)) => (true, 1, 0),
+            Some(Storage::Directions { apart }) => (!apart, 1, 0),
+            Some(Storage::Slopes { apart }) => (!apart, 2, 0),
+            Some(Storage::Cells(cells)) => (false, 1, cells.count()),
         };
         // With their spreads, four in a layer, and the normals below lobes that are about other directions.
         let cells = cells + cells / 4 + if base.upright() { 0 } else { cells };

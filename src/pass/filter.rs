@@ -1,6 +1,7 @@
 //! Pass 2: what the surfaces' textures say at the pixel's scale: shading normals, factors, roughness and lobes.
 
-use crate::config::{Bins, Config, Division};
+use crate::config::{Bins, Config};
+use crate::distribution::Division;
 use crate::error::Result;
 use crate::gpu::access::Access;
 use crate::gpu::buffer::Buffer;

@@ -182,22 +182,7 @@ impl GBuffer {
         };
         let attachments = colors.map(|image| attachment(image, Access::COLOR_WRITE.layout, 0.0));
         let depth = attachment(&io.images.depth, Access::DEPTH_WRITE.layout, 1.0);
-        let [width, height] = io.images.surface.extent();
-        let area = vk::Rect2D { extent: vk::Extent2D { width, height }, ..Default::default() };
-        let info = vk::RenderingInfo::default()
-            .render_area(area)
-            .layer_count(1)
-            .color_attachments(&attachments)
-            .depth_attachment(&depth);
-        let viewport = vk::Viewport { width: width as f32, height: height as f32, max_depth: 1.0, ..Default::default() };
-        let device = &rec.cx.device;
-        // SAFETY: the command buffer is recording; attachments were made ready above; dynamic state is all set.
-        unsafe {
-            device.cmd_begin_rendering(rec.cmd, &info);
-            device.cmd_bind_pipeline(rec.cmd, vk::PipelineBindPoint::GRAPHICS, self.pipeline.pipeline);
-            device.cmd_set_viewport(rec.cmd, 0, &[viewport]);
-            device.cmd_set_scissor(rec.cmd, 0, &[area]);
-        }
+        self.pipeline.begin(rec, io.images.surface.extent(), &attachments, Some(&depth));
         for draw in io.draws {
             let push = Push {
                 clip_from_object: (io.clip_from_world * draw.world_from_object()).to_cols_array_2d(),
@@ -206,8 +191,7 @@ impl GBuffer {
             };
             draw.record(rec, self.pipeline.layout, &push, &self.no_tangent);
         }
-        // SAFETY: closes the rendering begun above.
-        unsafe { device.cmd_end_rendering(rec.cmd) };
+        self.pipeline.end(rec);
         rec.end();
     }
 

@@ -1,7 +1,8 @@
 //! Materials' textures on the device: layers of arrays by size and format, and where each material's maps are.
 
-use crate::config::{Bins, Filter, MOST_BASE_LOBES};
+use crate::config::Bins;
 use crate::distribution::effective::Rule;
+use crate::distribution::{Filter, MOST_BASE_LOBES};
 use crate::error::{Error, Result};
 use crate::gpu::access::Access;
 use crate::gpu::buffer::Buffer;
@@ -179,6 +180,53 @@ fn groups(
     (groups, places)
 }
 
+/// Of each of `materials` what has to be known of it to make the cells of an object of it. Moments and cells of `groups` are behind
+/// `first` classes of textures.
+fn divided(
+    materials: &[Material],
+    bases: &[Option<Base>],
+    places: &[Option<MomentsPlace>],
+    groups: &[Group],
+    first: usize,
+) -> Result<Vec<Option<Divided>>> {
+    let mut all = Vec::new();
+    for (i, ((material, base), place)) in materials.iter().zip(bases).zip(places).enumerate() {
+        let of_objects = place.and_then(|p| Some((p.moments.0, p.cells?))).zip(*base);
+        let Some((((moments, layer), ((cells, _), layers)), base)) = of_objects else {
+            all.push(None);
+            continue;
+        };
+        if material.maps.tiling != [1.0; 2] {
+            let (field, got) = (format!("materials[{i}].maps.tiling"), format!("{:?}", material.maps.tiling));
+            return Err(Error::invalid(field, "[1.0, 1.0], as bins are camera", got));
+        }
+        let size = groups.get(moments - first).map_or([1; 2], |group| group.size);
+        all.push(Some(Divided { moments, cells, size, lobes: vmf_mips::Lobes::of(&base, layer), layers }));
+    }
+    Ok(all)
+}
+
+impl Record {
+    /// Of a material whose `lobes` are filtered, and the codes of its maps, its moments and its cells.
+    fn of(material: &Material, lobes: &Base, [albedo, specular, normal, roughness, moments, cells]: [u32; 6]) -> Self {
+        let own = lobes.lobes();
+        Self {
+            places: [albedo, specular, normal, roughness],
+            tiling: material.maps.tiling,
+            rule: rule(material),
+            without: if matches!(material.model, Model::Vmf(_)) { 0.0 } else { 1.0 },
+            moments,
+            cells,
+            lobes: brdf_map::lobes(!own.is_empty(), Parameter::of(&material.model)),
+            weights: brdf_map::weights(own),
+            count: own.len() as u32,
+            upright: u32::from(lobes.upright()),
+            concentration: own.first().map_or(0.0, |lobe| lobe.kappa as f32),
+            facing: lobes.facing() as f32,
+        }
+    }
+}
+
 impl MapsUpload {
     pub fn new(build: &mut Build<'_>, materials: &[Material], reading: &Reading<'_>) -> Result<Self> {
         let filters = reading.passes.is_some();
@@ -208,21 +256,7 @@ impl MapsUpload {
         };
         let places: Vec<_> = places.into_iter().map(|p| p.and_then(place)).collect();
 
-        let mut divided = Vec::new();
-        for (i, ((place, base), material)) in places.iter().zip(&bases).zip(materials).enumerate() {
-            let of_objects = place.filter(|_| camera).and_then(|p| Some((p.moments.0, p.cells?))).zip(*base);
-            let Some((((moments, first), ((cells, _), layers)), base)) = of_objects else {
-                divided.push(None);
-                continue;
-            };
-            if material.maps.tiling != [1.0; 2] {
-                let (field, got) = (format!("materials[{i}].maps.tiling"), format!("{:?}", material.maps.tiling));
-                return Err(Error::invalid(field, "[1.0, 1.0], as bins are camera", got));
-            }
-            let size = groups.get(moments - classes.len()).map_or([1; 2], |group| group.size);
-            divided.push(Some(Divided { moments, cells, size, lobes: vmf_mips::Lobes::of(&base, first), layers }));
-        }
-
+        let divided = if camera { divided(materials, &bases, &places, &groups, classes.len())? } else { Vec::new() };
         let (mut uses, mut unfiltered) = (Uses::default(), false);
         let mut records = Vec::with_capacity(materials.len());
         for (((material, slots), base), place) in materials.iter().zip(slots).zip(bases).zip(&places) {
@@ -240,21 +274,7 @@ impl MapsUpload {
                 BaseLobes::of(&material.model, reading.rule).filter(|own| filters && own.upright() && own.lobes().len() == 1);
             let lobes = base.or(lone.map(Base::Lobes)).unwrap_or(Base::Normals);
             unfiltered |= lobes.lobes().is_empty();
-            let [albedo, specular, normal, roughness, moments, cells] = slots.map(code);
-            records.push(Record {
-                places: [albedo, specular, normal, roughness],
-                tiling: material.maps.tiling,
-                rule: rule(material),
-                without: if matches!(material.model, Model::Vmf(_)) { 0.0 } else { 1.0 },
-                moments,
-                cells,
-                lobes: brdf_map::lobes(!lobes.lobes().is_empty(), Parameter::of(&material.model)),
-                weights: brdf_map::weights(lobes.lobes()),
-                count: lobes.lobes().len() as u32,
-                upright: u32::from(lobes.upright()),
-                concentration: lobes.lobes().first().map_or(0.0, |lobe| lobe.kappa as f32),
-                facing: lobes.facing() as f32,
-            });
+            records.push(Record::of(material, &lobes, slots.map(code)));
         }
         let classes = classes.iter().map(|class| upload(build, class)).collect::<Result<Vec<_>>>()?;
         let mut moments = Vec::new();

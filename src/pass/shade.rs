@@ -1,7 +1,7 @@
 //! Pass 8: reflected radiance of the listed samples (Bagher 2011, equations 1 and 2, section 3.3).
 
-use crate::config::{Config, Estimator, Filter};
-use crate::distribution;
+use crate::config::{Config, Estimator};
+use crate::distribution::Filter;
 use crate::error::Result;
 use crate::frequency::allocation::Allocation;
 use crate::gpu::access::Access;
@@ -85,7 +85,7 @@ pub(crate) struct Shade {
 /// Constants of `glsl/include/lobes.glsl`, and whether there are materials whose lobes the filter does not find.
 pub(crate) fn lobe_constants(config: &Config, unfiltered: bool) -> [u32; 5] {
     let layers = config.filter.lobe_layers();
-    let slopes = config.filter.stored().is_some_and(distribution::Filter::has_slopes);
+    let slopes = config.filter.has_slopes();
     let smith = config.filter == Filter::Leadr;
     [layers.max(1), u32::from(layers > 0), u32::from(slopes), u32::from(smith), u32::from(unfiltered)]
 }

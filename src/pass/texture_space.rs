@@ -58,21 +58,7 @@ impl TextureSpace {
                 .image_layout(Access::COLOR_WRITE.layout)
                 .load_op(vk::AttachmentLoadOp::CLEAR)
                 .store_op(vk::AttachmentStoreOp::STORE);
-            let [width, height] = images.frames.extent();
-            let area = vk::Rect2D { extent: vk::Extent2D { width, height }, ..Default::default() };
-            let info = vk::RenderingInfo::default()
-                .render_area(area)
-                .layer_count(1)
-                .color_attachments(std::slice::from_ref(&attachment));
-            let viewport = vk::Viewport { width: width as f32, height: height as f32, max_depth: 1.0, ..Default::default() };
-            let device = &rec.cx.device;
-            // SAFETY: the command buffer is recording; the attachment was made ready above; dynamic state is all set.
-            unsafe {
-                device.cmd_begin_rendering(rec.cmd, &info);
-                device.cmd_bind_pipeline(rec.cmd, vk::PipelineBindPoint::GRAPHICS, self.pipeline.pipeline);
-                device.cmd_set_viewport(rec.cmd, 0, &[viewport]);
-                device.cmd_set_scissor(rec.cmd, 0, &[area]);
-            }
+            self.pipeline.begin(rec, images.frames.extent(), &[attachment], None);
             let world = draw.world_from_object();
             let push = Push {
                 world_from_object: [0, 1, 2].map(|i| world.row(i).to_array()),
@@ -80,8 +66,7 @@ impl TextureSpace {
                 eye: io.eye.extend(1.0).to_array(),
             };
             draw.record(rec, self.pipeline.layout, &push, &self.no_tangent);
-            // SAFETY: closes the rendering begun above.
-            unsafe { device.cmd_end_rendering(rec.cmd) };
+            self.pipeline.end(rec);
         }
         rec.end();
     }

@@ -1,7 +1,8 @@
 //! Pass 0b, continued: the mips of the moments, one dispatch a level for all layers of a size (Xu et al. 2017, section 3.2;
 //! [`crate::distribution::mip`] and [`crate::distribution::filter`] are the f64 twins). Cells begin at half the size of the map.
 
-use crate::config::{Bins, Config, MOST_BASE_LOBES};
+use crate::config::{Bins, Config};
+use crate::distribution::MOST_BASE_LOBES;
 use crate::error::Result;
 use crate::gpu::access::Access;
 use crate::gpu::image::Image;

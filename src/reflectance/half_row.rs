@@ -32,7 +32,7 @@ impl HalfRow<'_> {
 pub type Rows<'a> = Box<dyn Fn(&HalfRow<'_>, &mut [f64]) + 'a>;
 
 /// [`Rows`] of any reflectance, one after the other.
-pub(crate) fn one_by_one<'a>(reflectance: &'a (impl Reflectance + ?Sized), weights: DVec3) -> Rows<'a> {
+pub(super) fn one_by_one<'a>(reflectance: &'a (impl Reflectance + ?Sized), weights: DVec3) -> Rows<'a> {
     Box::new(move |row, out| {
         for (i, value) in out.iter_mut().enumerate() {
             let wi = 2.0 * row.cosines[i] * row.half(i) - row.wo;

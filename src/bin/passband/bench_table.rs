@@ -25,10 +25,10 @@ rate with mis against full rate with brdf-random; overhead: bandwidth, pyramid, 
 
 /// The whole report.
 pub fn text(report: &Report) -> String {
-    let device = report.device.as_ref().map_or("none".into(), |d| format!("{} ({})", d.name, d.driver));
+    let device = report.head.device.as_ref().map_or("none".into(), |d| format!("{} ({})", d.name, d.driver));
     let mut parts = vec![format!(
         "suite {}, preset {}, {} rounds, device {device}\n{:.0} s, {:.0} s of them for references",
-        report.suite, report.preset, report.rounds, report.seconds.total, report.seconds.references
+        report.head.suite, report.head.preset, report.head.rounds, report.seconds.total, report.seconds.references
     )];
     for scene in &report.scenes {
         parts.push(if scene.reference.is_some() { compared(scene) } else { passes(scene) });

@@ -15,10 +15,10 @@ ns, bytes: of set-up, and of the materials' memory beyond that with filter point
 
 /// The whole report.
 pub fn text(report: &Report) -> String {
-    let device = report.device.as_ref().map_or("none".into(), |d| format!("{} ({})", d.name, d.driver));
+    let device = report.head.device.as_ref().map_or("none".into(), |d| format!("{} ({})", d.name, d.driver));
     let mut parts = vec![format!(
         "suite {}, preset {}, {} rounds, device {device}\n{:.0} s, {:.0} s of them for truths",
-        report.suite, report.preset, report.rounds, report.seconds.total, report.seconds.references
+        report.head.suite, report.head.preset, report.head.rounds, report.seconds.total, report.seconds.references
     )];
     parts.push(ERRORS.into());
     parts.extend(report.scenes.iter().map(errors));

@@ -15,9 +15,9 @@ use crate::offline::stats::{Pixels, Samples};
 use serde::Serialize;
 use std::collections::BTreeMap;
 
-/// A whole run.
+/// What was run, and on what.
 #[derive(Clone, Debug, Serialize)]
-pub struct Report {
+pub struct Head {
     /// Version of this layout.
     pub schema: u32,
     /// Version of the program.
@@ -30,6 +30,21 @@ pub struct Report {
     pub rounds: u32,
     /// The device; absent if every scene was skipped.
     pub device: Option<DeviceInfo>,
+}
+
+impl Head {
+    /// Of a run whose device is not known yet.
+    pub fn new(suite: &'static str, preset: &'static str, rounds: u32) -> Self {
+        Self { schema: 1, passband: env!("CARGO_PKG_VERSION"), suite, preset, rounds, device: None }
+    }
+}
+
+/// A whole run.
+#[derive(Clone, Debug, Serialize)]
+pub struct Report {
+    /// What was run.
+    #[serde(flatten)]
+    pub head: Head,
     /// Scenes in the order of the run.
     pub scenes: Vec<SceneReport>,
     /// Scenes that lack files.

@@ -4,7 +4,7 @@ use crate::offline::bench::cases::{self, Case, Half};
 use crate::offline::bench::figures::{self, Figure};
 use crate::offline::bench::quality::Frame;
 use crate::offline::bench::reference::Converged;
-use crate::offline::bench::report::{Report, Row, SceneReport, Seconds, Skipped, gains};
+use crate::offline::bench::report::{Head, Report, Row, SceneReport, Seconds, Skipped, gains};
 use crate::offline::bench::runner::Runner;
 use crate::offline::bench::variants::{self, Family};
 use crate::offline::bench::{curves, environment, judge, table};
@@ -123,12 +123,7 @@ pub type Keep<'a> = dyn FnMut(&str, Figure) -> Result<()> + 'a;
 pub fn run(order: &Order, keep: Option<&mut Keep<'_>>, progress: &mut Progress<'_>) -> Result<Report> {
     let clock = Instant::now();
     let mut report = Report {
-        schema: 1,
-        passband: env!("CARGO_PKG_VERSION"),
-        suite: order.suite.name(),
-        preset: order.preset.name(),
-        rounds: order.rounds.unwrap_or(order.preset.rounds()),
-        device: None,
+        head: Head::new(order.suite.name(), order.preset.name(), order.rounds.unwrap_or(order.preset.rounds())),
         scenes: Vec::new(),
         skipped: Vec::new(),
         summary: Vec::new(),
@@ -198,7 +193,7 @@ impl Run<'_, '_, '_> {
                 found.curves = curves::of(&world, &base)?;
             }
             if let Some(light) = &world.environment {
-                found.environment = Some(environment::times(&light.map, &base, self.report.rounds)?);
+                found.environment = Some(environment::times(&light.map, &base, self.report.head.rounds)?);
             }
             if let Some(keep) = self.keep.as_mut().filter(|_| pictured) {
                 told(self.progress, "figures");
@@ -217,10 +212,10 @@ impl Run<'_, '_, '_> {
         let progress = &mut *self.progress;
         let mut told = |what: &str, done, total| progress(&format!("{}: {what}", world.name), done, total);
         let mut runner = Runner::new(world, variants, &mut |done, total| told("set-up", done, total))?;
-        runner.time(self.report.rounds, &mut |done, total| told("frames", done, total))?;
+        runner.time(self.report.head.rounds, &mut |done, total| told("frames", done, total))?;
         let frames = runner.frames(order.suite.error_frames(), &mut |done, total| told("images", done, total))?;
         let measured = runner.measured()?;
-        self.report.device = measured.first().map(|m| m.stats.device.clone());
+        self.report.head.device = measured.first().map(|m| m.stats.device.clone());
         let first = measured.first().map(|m| m.times.clone()).unwrap_or_default();
         found.variants = measured.into_iter().map(|m| Row::new(m, &first)).collect();
         Ok(frames)

@@ -1,6 +1,6 @@
 //! Scene files: TOML in, a resolved [`World`] out.
 
-use crate::config::PRINTED_LENGTHS;
+use crate::distribution::filter::PRINTED_LENGTHS;
 use crate::frequency::allocation::Allocation;
 use crate::frequency::operators::{Combine, Operator};
 use crate::offline::animation::AnimatedWorld;

@@ -11,7 +11,7 @@ mod times;
 mod truths;
 
 use crate::offline::bench::reference::Goal;
-use crate::offline::bench::report::Seconds;
+use crate::offline::bench::report::{Head, Seconds};
 use crate::offline::bench::suites::{Keep, Preset, Progress};
 use crate::offline::cache;
 use crate::offline::error::{Error, Result};
@@ -86,12 +86,7 @@ const MARGIN: f64 = 10.0;
 pub fn run(order: &Order, mut keep: Option<&mut Keep<'_>>, progress: &mut Progress<'_>) -> Result<Report> {
     let clock = Instant::now();
     let mut report = Report {
-        schema: 1,
-        passband: env!("CARGO_PKG_VERSION"),
-        suite: "xu",
-        preset: order.preset.name(),
-        rounds: order.rounds.unwrap_or(order.preset.frames_timed()),
-        device: None,
+        head: Head::new("xu", order.preset.name(), order.rounds.unwrap_or(order.preset.frames_timed())),
         scenes: Vec::new(),
         skipped: Vec::new(),
         targets: Vec::new(),
@@ -105,7 +100,7 @@ pub fn run(order: &Order, mut keep: Option<&mut Keep<'_>>, progress: &mut Progre
         let world = scene.resolve()?;
         let config = scene.config(order.extent.unwrap_or(order.preset.still()));
         for light in Light::ALL {
-            let stage = Stage { order, light, world: light.alone_in(&world)?, config: &config, rounds: report.rounds };
+            let stage = Stage { order, light, world: light.alone_in(&world)?, config: &config, rounds: report.head.rounds };
             let found = stage.measure(&mut report, &mut keep, progress)?;
             report.scenes.push(found);
         }
@@ -174,7 +169,7 @@ impl Stage<'_> {
         if let Some(keep) = keep.as_mut() {
             keep(&self.world.name, strips::strip(self, &truth, &stills, &rows))?;
         }
-        report.device.get_or_insert(cost.device);
+        report.head.device.get_or_insert(cost.device);
         Ok(SceneReport {
             scene: self.world.name.clone(),
             light: self.light,

@@ -2,29 +2,19 @@
 
 use crate::Filter;
 use crate::offline::bench::quality::Noise;
-use crate::offline::bench::report::{Seconds, Skipped};
+use crate::offline::bench::report::{Head, Seconds, Skipped};
 use crate::offline::bench::statistics::{Ratio, Summary};
 use crate::offline::bench::table::Target;
 use crate::offline::bench::xu::cases::Light;
-use crate::offline::headless::DeviceInfo;
 use crate::offline::metrics::Metrics;
 use serde::Serialize;
 
 /// A whole run.
 #[derive(Clone, Debug, Serialize)]
 pub struct Report {
-    /// Version of this layout.
-    pub schema: u32,
-    /// Version of the program.
-    pub passband: &'static str,
-    /// Name of the suite.
-    pub suite: &'static str,
-    /// Name of the preset.
-    pub preset: &'static str,
-    /// Timed frames of each filter.
-    pub rounds: u32,
-    /// The device; absent if every scene was skipped.
-    pub device: Option<DeviceInfo>,
+    /// What was run.
+    #[serde(flatten)]
+    pub head: Head,
     /// Each scene under a point light, then under its environment.
     pub scenes: Vec<SceneReport>,
     /// Scenes that lack files.

@@ -115,7 +115,7 @@ fn preconvolved(stage: &Stage<'_>, config: &Config) -> Result<Option<Picture>> {
 
 /// Lobes of the session's last frame, a covered pixel.
 fn lobes(session: &mut Session, config: &Config) -> Result<Option<f64>> {
-    if config.filter.stored().is_none() {
+    if !config.filter.stores() {
         return Ok(None);
     }
     let Some((_, values)) = Aov::Lobes.read(session, config)?.into_iter().next() else { return Ok(None) };

@@ -45,7 +45,7 @@ struct Subject<'a> {
 impl Timed for Subject<'_> {
     fn frame(&mut self, seed: [u32; 2]) -> Result<()> {
         let timed = (WARM_UP..WARM_UP + self.rounds).contains(&seed[1]);
-        if timed && self.filter.is_some_and(|filter| filter.stored().is_some()) {
+        if timed && self.filter.is_some_and(Filter::stores) {
             let times = self.session.renew_materials(self.world)?;
             self.set_up_ms.push(times.iter().map(|(_, ms)| ms).sum());
         }
