@@ -22,6 +22,8 @@ layout(constant_id = 1) const bool LOCAL_LIGHTS = false;
 
 // Where the filter finds lobes: whether there are materials beside, which stay as they are.
 layout(constant_id = 10) const uint UNFILTERED = 1u;
+// Whether no lobe is sharper than the sharpest level, beyond which the map is looked up.
+layout(constant_id = 13) const uint EXACT = 0u;
 #include "approximation.glsl"
 
 layout(set = 2, binding = 1) uniform sampler2D normals;  // as the filter pass writes them
@@ -64,7 +66,7 @@ void main() {
     vec3 sum = a.diffuse * prefiltered_irradiance(f.z);
     for (uint i = 0u; i < a.count; ++i) {
         ReflectedLobe lobe = approximation_lobe(m, l, a, i, f.view);
-        sum += lobe.weight * prefiltered(to_world(f, lobe.direction), lobe.kappa);
+        sum += lobe.weight * prefiltered(to_world(f, lobe.direction), EXACT != 0u ? min(lobe.kappa, prefiltered_most()) : lobe.kappa);
     }
     for (uint i = 0u; i < prefiltered_suns(); ++i) {
         sum += reflected_light(f, m, l, prefiltered_sun(i), prefiltered_sun_irradiance(i));

@@ -176,6 +176,9 @@ pub struct Config {
     /// Errors of a fit up to which the residual of [`Estimator::Residual`] is left out; with [`Rate::Bandwidth`] is shaded at the
     /// coarsest level; is shaded at that of half the pixels a side. Beyond it is shaded at every sample.
     pub residual_errors: [f32; 3],
+    /// Whether lobes are taken to be what look-ups of them hold, texel by texel, and none to be sharper than the sharpest level: with
+    /// [`Estimator::Cv`] nothing is left that makes its mean wrong, at several times the cost. To test with.
+    pub exact_lobes: bool,
     /// How shaded samples share them. All but [`Allocation::Constant`] need [`Rate::Bandwidth`], whose prediction they go by, and
     /// levels above a sample; `directions` is the mean then.
     pub allocation: Allocation,
@@ -211,6 +214,7 @@ impl Config {
             geometric: false,
             directions: 64,
             residual_errors: RESIDUAL_ERRORS,
+            exact_lobes: false,
             allocation: Allocation::default(),
             curvature: false,
             gbuffer: GBufferSource::default(),

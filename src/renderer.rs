@@ -304,7 +304,8 @@ impl Renderer {
         // 8  Radiance of the samples to shade, or what the base leaves of it.
         let offset = (FACTOR_OFFSET * environment.mean * f64::from(inputs.environment.intensity)).max(1e-6) as f32;
         if let Some(pass) = &of_kinds.shade {
-            let base = targets.base.as_ref().zip(materials.fits.as_ref());
+            let known = targets.base.as_ref().zip(materials.fits.as_ref()).zip(environment.prefiltered.as_ref());
+            let residual = known.map(|((base, fits), light)| shade::Residual { base, fits, suns: &light.suns, offset });
             pass.record(
                 rec,
                 &shade::Io {
@@ -321,7 +322,7 @@ impl Renderer {
                     lights,
                     light_count,
                     directions,
-                    residual: base.map(|(base, fits)| shade::Residual { base, fits, offset }),
+                    residual,
                     radiance,
                     odd: targets.odd.as_ref(),
                 },

@@ -42,6 +42,7 @@ pub const INTERFACE: Interface = Interface {
         D::COMBINED_IMAGE_SAMPLER,
         D::STORAGE_BUFFER,
         D::COMBINED_IMAGE_SAMPLER,
+        D::STORAGE_BUFFER,
     ],
 };
 
@@ -86,6 +87,8 @@ pub(crate) struct Residual<'a> {
     /// Of the `base` pass.
     pub base: &'a Image,
     pub fits: &'a Buffer,
+    /// Of the pre-convolved light.
+    pub suns: &'a Buffer,
     /// On both sides of a factor on it, in radiance.
     pub offset: f32,
 }
@@ -123,8 +126,11 @@ impl Shade {
             let allocated = u32::from(config.allocation != Allocation::Constant);
             let (levelled, widened) = (u32::from(levelled), u32::from(config.widened()));
             let own = [constant, lights, levelled, widened, config.sharing_levels(), allocated];
-            let constants: Vec<_> =
-                own.into_iter().chain(lobe_constants(config, kinds)).chain([kinds.most_lobes, u32::from(ratio)]).collect();
+            let constants: Vec<_> = own
+                .into_iter()
+                .chain(lobe_constants(config, kinds))
+                .chain([kinds.most_lobes, u32::from(ratio), u32::from(config.exact_lobes)])
+                .collect();
             ComputePipeline::new(p.build, p.modules, &INTERFACE, p.bridge, p.slots, &constants)
         };
         // Unbiased with all of it.
@@ -143,9 +149,9 @@ impl Shade {
         rec.buffer(io.arguments, Access::COMPUTE_READ);
         rec.buffer(io.list, Access::COMPUTE_READ);
         rec.overwrite(io.radiance, Access::COMPUTE_WRITE);
-        if let Some(Residual { base, fits, .. }) = io.residual {
+        if let Some(Residual { base, fits, suns, .. }) = io.residual {
             rec.image(base, Access::COMPUTE_SAMPLED);
-            rec.buffer(fits, Access::COMPUTE_READ);
+            [fits, suns].into_iter().for_each(|buffer| rec.buffer(buffer, Access::COMPUTE_READ));
         }
         if let Some(odd) = io.odd {
             rec.overwrite(odd, Access::COMPUTE_WRITE);
@@ -166,6 +172,7 @@ impl Shade {
             // Bound to something where there are none.
             Resource::Buffer(io.residual.map_or(io.lights, |r| r.fits)),
             Resource::Sampled(io.residual.map_or(io.normals, |r| r.base), io.samplers.nearest),
+            Resource::Buffer(io.residual.map_or(io.lights, |r| r.suns)),
         ];
         let Directions { brdf, environment, light } = io.directions;
         let offset = io.residual.map_or(0.0, |r| r.offset);
