@@ -11,6 +11,7 @@ pub mod effective;
 pub mod filter;
 pub mod filtered;
 pub mod fit;
+pub mod fitter;
 pub mod literal;
 pub mod mip;
 pub mod mixture;
