@@ -2,6 +2,7 @@
 
 use crate::config::Bins;
 use crate::distribution::effective::Rule;
+use crate::distribution::fitter::Budget;
 use crate::error::{Error, Result};
 use crate::gpu::memory::HostAllocator;
 use crate::gpu::pipeline::BridgeLayouts;
@@ -72,10 +73,11 @@ impl Renderer {
         let (filter, bins) = (self.config.filter, self.config.bins);
         let (passes, samplers) = (self.passes.moments.as_ref(), &self.samplers);
         let (eps, estimator) = (config.predicts().then_some(config.eps), config.estimator);
+        let budget = Budget { lobes: config.fit_lobes as usize, ..Budget::default() };
         let kept = self.materials.as_ref().map(|m| m.of_kinds.kinds);
         let (mut upload, filter, of_kinds) = Build::run(&self.cx, memory, |build| {
             let reading = Reading { filter, bins, rule, widened, passes, samplers };
-            let upload = MaterialsUpload::new(build, materials, &Uploading { reading, eps, estimator })?;
+            let upload = MaterialsUpload::new(build, materials, &Uploading { reading, eps, estimator, budget })?;
             let mut p = PassContext { build, modules, bridge, slots };
             let filter = filter::Filter::new(&mut p, config, upload.uses())?;
             let fresh = kept != Some(upload.kinds);
