@@ -1,11 +1,12 @@
 #version 460
-// Noise-free radiance of every sample: the environment under the material's reflected lobes, irradiance on its diffuse part, and
-// suns and exact lights by the reflectance itself.
+// Noise-free radiance of every sample: the environment under the lobes that stand for the material, irradiance on its diffuse part,
+// and suns and exact lights by the reflectance itself.
 // Whether the filter widens lobes.
 layout(constant_id = 0) const bool KERNEL = false;
 #define MATERIAL_KERNEL KERNEL
 #define PREFILTER_BINDING 5
 #define LOBES_BINDING 9
+#define FIT_BINDING 10
 #include "frame.glsl"
 #include "gbuffer.glsl"
 #include "materials.glsl"
@@ -13,7 +14,6 @@ layout(constant_id = 0) const bool KERNEL = false;
 #include "lobes.glsl"
 #include "lights.glsl"
 #include "prefilter.glsl"
-#include "reflected.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
 
@@ -22,6 +22,9 @@ layout(constant_id = 1) const bool LOCAL_LIGHTS = false;
 
 // Where the filter finds lobes: whether there are materials beside, which stay as they are.
 layout(constant_id = 10) const uint UNFILTERED = 1u;
+// Whether no lobe is sharper than the sharpest level, beyond which the map is looked up.
+layout(constant_id = 13) const uint EXACT = 0u;
+#include "approximation.glsl"
 
 layout(set = 2, binding = 1) uniform sampler2D normals;  // as the filter pass writes them
 layout(set = 2, binding = 2) uniform usampler2D factors;
@@ -59,15 +62,11 @@ void main() {
 
     Lobes l = lobes_load(p, f, m);
 
-    vec3 sum = reflected_diffuse(m, f.view) * prefiltered_irradiance(f.z);
-    uint own = LOBED != 0u && l.count > 0u ? 0u : reflected_count(m);
-    for (uint i = 0u; UNFILTERED != 0u && i < own; ++i) {
-        ReflectedLobe lobe = reflected_lobe(m, i, f.view);
-        sum += lobe.weight * prefiltered(to_world(f, lobe.direction), lobe.kappa);
-    }
-    for (uint i = 0u; LOBED != 0u && i < l.count; ++i) {
-        ReflectedLobe lobe = reflected_found(m, l, i, f.view);
-        sum += lobe.weight * prefiltered(to_world(f, lobe.direction), lobe.kappa);
+    Approximation a = approximation_load(m, l, f.view);
+    vec3 sum = a.diffuse * prefiltered_irradiance(f.z);
+    for (uint i = 0u; i < a.count; ++i) {
+        ReflectedLobe lobe = approximation_lobe(m, l, a, i, f.view);
+        sum += lobe.weight * prefiltered(to_world(f, lobe.direction), EXACT != 0u ? min(lobe.kappa, prefiltered_most()) : lobe.kappa);
     }
     for (uint i = 0u; i < prefiltered_suns(); ++i) {
         sum += reflected_light(f, m, l, prefiltered_sun(i), prefiltered_sun_irradiance(i));

@@ -1,10 +1,13 @@
 #version 460
+#extension GL_EXT_control_flow_attributes : require
 // Reflected radiance of listed samples by N directions each, the same number or one of their own (Bagher 2011, equations 1 and 2,
-// sections 2.3 and 3.3): half from the reflectance, half from the environment, combined by the balance heuristic; or all from the reflectance.
+// sections 2.3 and 3.3): half from the reflectance, half from the environment, combined by the balance heuristic; or all from the
+// reflectance; or of what the lobes that stand for the material leave of it, which `base` knows the rest of.
 // Whether the filter widens lobes.
 layout(constant_id = 3) const bool KERNEL = false;
 #define MATERIAL_KERNEL KERNEL
 #define LOBES_BINDING 10
+#define FIT_BINDING 11
 #include "frame.glsl"
 #include "gbuffer.glsl"
 #include "materials.glsl"
@@ -15,6 +18,8 @@ layout(constant_id = 3) const bool KERNEL = false;
 #include "lobes.glsl"
 #include "list.glsl"
 #include "levels.glsl"
+#include "suns.glsl"
+#include "texel_kernel.glsl"
 
 layout(local_size_x = LIST_GROUP) in;
 
@@ -23,6 +28,7 @@ const uint ESTIMATOR_MIS = 0u;
 const uint ESTIMATOR_BRDF = 1u;
 const uint ESTIMATOR_BRDF_RANDOM = 2u;
 const uint ESTIMATOR_LOOKUP = 3u;
+const uint ESTIMATOR_RESIDUAL = 4u;
 // Whether the frame has lights beside the environment. Without them their loops are compiled away: some devices run a
 // loop's body once, masked, even for no iteration.
 layout(constant_id = 1) const bool LOCAL_LIGHTS = false;
@@ -34,6 +40,12 @@ layout(constant_id = 4) const int SHARING = 0;
 layout(constant_id = 5) const bool ALLOCATED = false;
 // Where the filter finds lobes: whether there are materials beside, which stay as they are.
 layout(constant_id = 10) const uint UNFILTERED = 1u;
+#include "approximation.glsl"
+// The most lobes that stand for a material, and whether what is left is stored as a factor on what they reflect.
+layout(constant_id = 13) const uint APPROXIMATING = 1u;
+layout(constant_id = 14) const uint RATIO = 0u;
+// Whether lobes are taken to be just what look-ups of them hold.
+layout(constant_id = 15) const uint EXACT = 0u;
 
 layout(set = 2, binding = 3, std430) readonly buffer Arguments {
     uint groups_x, groups_y, groups_z;
@@ -50,11 +62,17 @@ layout(set = 2, binding = 7, rgba32f) uniform writeonly image2D odd; // of odd l
 
 layout(set = 2, binding = 8) uniform sampler2D normals;  // as the filter pass writes them
 layout(set = 2, binding = 9) uniform usampler2D factors;
+layout(set = 2, binding = 12) uniform sampler2D base; // radiance by those lobes, suns and exact lights
+layout(set = 2, binding = 13, std430) readonly buffer PrefilterSuns {
+    SunList suns;
+} prefilter;
 
 layout(push_constant) uniform Push {
     uint brdf_samples; // of a sample that stands for a pixel or more, as Directions::split of src/plan.rs shares them out; if ALLOCATED, each entry's own number is
     uint environment_samples;
     uint light_samples; // for each area light
+    float offset; // on both sides of a factor, in radiance
+    float negligible; // errors up to this are left as they are
 } push;
 
 // This sample's.
@@ -77,7 +95,8 @@ uint turn(ivec2 p, int l, int finer) {
 void split(uint n) {
     uint area = LOCAL_LIGHTS ? frame.lights.y : 0u;
     uint sources = area + (push.environment_samples > 0u ? 1u : 0u);
-    if (ESTIMATOR != ESTIMATOR_MIS || sources == 0u) {
+    bool alone = ESTIMATOR == ESTIMATOR_BRDF || ESTIMATOR == ESTIMATOR_BRDF_RANDOM;
+    if (alone || sources == 0u) {
         brdf_samples = n;
         environment_samples = 0u;
         light_samples = 0u;
@@ -100,25 +119,89 @@ bool lobed(Surface s) {
     return LOBED != 0u && (s.lobes.count > 0u || UNFILTERED == 0u);
 }
 
-// Reflectance times the cosine for light from local wi above the horizon, h the half vector, and in a the density per steradian
-// of wi for the weights of directions.
+// The lobes that stand for the material as they are looked up, which is between two levels (glsl/include/prefilter.glsl): direction;
+// exponent of a squared distance in the broader level, height there, height in the sharper one, whether that is the map;
+// factor on irradiance.
+vec3 approximating_direction[APPROXIMATING];
+float approximating_scale[APPROXIMATING];
+vec3 approximating_broad[APPROXIMATING];
+vec3 approximating_sharp[APPROXIMATING];
+bool approximating_map[APPROXIMATING];
+bool approximating_even[APPROXIMATING]; // the sharper level is one of the second image
+vec3 approximating_diffuse;
+
+void approximate(Surface s, Approximation a) {
+    approximating_diffuse = a.diffuse;
+    [[unroll]] for (uint i = 0u; i < APPROXIMATING; ++i) {
+        bool there = i < a.count;
+        ReflectedLobe lobe = approximation_lobe(s.material, s.lobes, a, there ? i : 0u, s.frame.view);
+        approximating_direction[i] = lobe.direction;
+        // As `prefiltered` has it; the map's bilinear look-ups are 5 factors of 2 sharper than the sharpest lobe.
+        vec4 scale = prefilter.suns.scale;
+        float steps = min(-log2(lobe.kappa * scale.x), scale.y);
+        steps = EXACT != 0u ? max(steps, 0.0) : steps;
+        bool map = steps < 0.0;
+        float whole = floor(steps);
+        float kappa = exp2(map ? 0.0 : -whole - 1.0) / scale.x, sharper = kappa * (map ? 32.0 : 2.0);
+        float weight = map ? 1.0 - min(-steps * scale.z, 1.0) : steps - whole;
+        vec3 amplitude = there ? lobe.weight : vec3(0.0);
+        approximating_scale[i] = -0.5 * kappa;
+        approximating_broad[i] = amplitude * (weight * vmf_normalisation(kappa));
+        approximating_sharp[i] = amplitude * ((1.0 - weight) * vmf_normalisation(sharper));
+        approximating_map[i] = map;
+        approximating_even[i] = fract(0.5 * whole) == 0.0;
+    }
+}
+
+// What they have in the place of reflectance times cosine, for light from local wi, which may be below the horizon.
+vec3 approximation(Surface s, vec3 wi) {
+    vec3 sum = approximating_diffuse * max(wi.z, 0.0);
+    [[unroll]] for (uint i = 0u; i < APPROXIMATING; ++i) {
+        vec3 d = wi - approximating_direction[i];
+        float broad = exp(approximating_scale[i] * dot(d, d)), sharp = broad * broad;
+        float fourth = sharp * sharp, sixteenth = fourth * fourth * fourth * fourth;
+        sharp = approximating_map[i] ? sixteenth * sixteenth : sharp;
+        if (EXACT != 0u) {
+            vec3 centre = to_world(s.frame, approximating_direction[i]), w = to_world(s.frame, wi);
+            float kappa = -2.0 * approximating_scale[i];
+            bool even = approximating_even[i];
+            broad = texel_kernel(centre, kappa, even ? 4.0 : 2.0, w) / vmf_normalisation(kappa);
+            sharp = texel_kernel(centre, 2.0 * kappa, even ? 2.0 : 4.0, w) / vmf_normalisation(2.0 * kappa);
+        }
+        sum += approximating_broad[i] * broad + approximating_sharp[i] * sharp;
+    }
+    return sum;
+}
+
+// What of reflectance times cosine light that is looked up does not have.
+vec3 remaining(Surface s, vec3 reflected, vec3 wi) {
+    return ESTIMATOR == ESTIMATOR_RESIDUAL ? reflected - approximation(s, wi) : reflected;
+}
+
+// Reflectance times the cosine for light from local wi, h the half vector, and in a the density per steradian of wi for the weights
+// of directions. Below the horizon, where only a residual asks, it is 0.
 vec4 reflected(Surface s, vec3 wi, vec3 h) {
     vec3 wo = s.frame.view;
+    bool above = ESTIMATOR != ESTIMATOR_RESIDUAL || wi.z > 0.0;
+    vec3 toward = above ? wi : wo;
     vec4 of_lobes = vec4(0.0);
     if (LOBED != 0u) {
         of_lobes = lobes_evaluate(s.material, s.lobes, wi, wo, h);
     }
     vec4 whole = vec4(0.0);
     if (UNFILTERED != 0u) {
-        whole = vec4(material_evaluate(s.material, wi, wo, h) * wi.z, material_density(s.material, h) * 0.25 / dot(wo, h));
+        whole = vec4(material_evaluate(s.material, toward, wo, above ? h : wo) * toward.z, material_density(s.material, h) * 0.25 / dot(wo, h));
+        whole.a = above || h.z > 0.0 ? whole.a : 0.0;
     }
-    return lobed(s) ? of_lobes : whole;
+    vec4 value = lobed(s) ? of_lobes : whole;
+    value.rgb = above ? value.rgb : vec3(0.0);
+    return value;
 }
 
 // Contribution of a direction drawn from the reflectance, seen from world point p. The environment and every area light
 // weigh it against their own samples (balance heuristic, one light at a time: lights add up).
 vec3 brdf_contribution(Surface s, vec3 p, uvec2 u) {
-    vec3 wi = vec3(0.0, 0.0, -1.0), h = vec3(0.0, 0.0, 1.0);
+    vec3 wi = vec3(0.0), h = vec3(0.0, 0.0, 1.0); // 0 if none is drawn
     float drawn = 0.0; // density per steradian of wi; 0 if it is that of the weights
     if (UNFILTERED != 0u) {
         vec4 half_vector = material_sample(s.material, u);
@@ -132,24 +215,24 @@ vec3 brdf_contribution(Surface s, vec3 p, uvec2 u) {
         h = normalize(wi + s.frame.view);
         drawn = 0.0;
     }
-    if (wi.z <= 0.0) {
+    if (ESTIMATOR == ESTIMATOR_RESIDUAL ? dot(wi, wi) == 0.0 : wi.z <= 0.0) {
         return vec3(0.0);
     }
     vec3 w = to_world(s.frame, wi);
     vec4 light = environment_lookup(w);
     vec4 value = reflected(s, wi, h);
-    bool alone = ESTIMATOR != ESTIMATOR_MIS;
+    bool alone = ESTIMATOR == ESTIMATOR_BRDF || ESTIMATOR == ESTIMATOR_BRDF_RANDOM;
     drawn = drawn > 0.0 ? drawn : value.a;
     float weight_density = alone ? drawn : value.a;
     float brdf = float(brdf_samples) * weight_density;
     float environment = alone ? 0.0 : float(environment_samples) * environment_per_steradian(light.a, length(w.xz));
-    vec3 sum = light.rgb / (brdf + environment);
+    vec3 sum = remaining(s, value.rgb, wi) * light.rgb / (brdf + environment);
     for (uint i = 0u; LOCAL_LIGHTS && i < frame.lights.y; ++i) {
         float density = light_density(lights[frame.lights.x + i], p, w);
         float competing = alone ? 0.0 : float(light_samples) * density;
-        sum += density > 0.0 ? lights[frame.lights.x + i].power.rgb / (brdf + competing) : vec3(0.0);
+        sum += density > 0.0 ? value.rgb * lights[frame.lights.x + i].power.rgb / (brdf + competing) : vec3(0.0);
     }
-    return value.rgb * sum * (weight_density / drawn);
+    return sum * (weight_density / drawn);
 }
 
 // Contribution of a direction drawn from the environment.
@@ -158,7 +241,7 @@ vec3 environment_contribution(Surface s, uvec2 u) {
     vec2 uv = environment_place(u);
     vec4 w = environment_direction(uv);
     vec3 wi = vec3(dot(w.xyz, f.x), dot(w.xyz, f.y), dot(w.xyz, f.z));
-    bool above = wi.z > 0.0;
+    bool above = ESTIMATOR == ESTIMATOR_RESIDUAL || wi.z > 0.0;
     // Where lanes run in lock step without masked loads, those below the horizon read one common place instead of scattered ones.
     uv = above ? uv : vec2(0.0);
     wi = above ? wi : vec3(0.0, 0.0, 1.0);
@@ -166,7 +249,7 @@ vec3 environment_contribution(Surface s, uvec2 u) {
     vec4 value = reflected(s, wi, normalize(wi + f.view));
     float environment = float(environment_samples) * environment_per_steradian(light.a, w.w);
     float brdf = float(brdf_samples) * value.a;
-    return above ? value.rgb * light.rgb / (brdf + environment) : vec3(0.0);
+    return above ? remaining(s, value.rgb, wi) * light.rgb / (brdf + environment) : vec3(0.0);
 }
 
 // Contribution of a direction drawn from an area light.
@@ -255,12 +338,22 @@ void main() {
         store(p, l, sum);
         return;
     }
+    vec3 known = vec3(0.0);
+    if (ESTIMATOR == ESTIMATOR_RESIDUAL) {
+        Approximation a = approximation_load(m, s.lobes, f.view);
+        if (approximation_error(a) <= push.negligible) {
+            store(p, l, vec3(RATIO != 0u ? 1.0 : 0.0));
+            return;
+        }
+        approximate(s, a);
+        known = texelFetch(base, p, 0).rgb;
+    }
     uvec2 seeds = sobol_seeds(seed);
     for (uint i = 0u; i < brdf_samples; ++i) {
         uint point = before * brdf_samples + i;
         sum += brdf_contribution(s, at, ESTIMATOR == ESTIMATOR_BRDF_RANDOM ? random_point(point, seed) : sobol_point(point, seeds));
     }
-    if (ESTIMATOR == ESTIMATOR_MIS) {
+    if (ESTIMATOR == ESTIMATOR_MIS || ESTIMATOR == ESTIMATOR_RESIDUAL) {
         seeds = sobol_seeds(seed + 1u);
         for (uint i = 0u; i < environment_samples; ++i) {
             sum += environment_contribution(s, sobol_point(before * environment_samples + i, seeds));
@@ -272,8 +365,12 @@ void main() {
             }
         }
     }
-    if (LOCAL_LIGHTS) {
+    if (LOCAL_LIGHTS && ESTIMATOR != ESTIMATOR_RESIDUAL) {
         sum += exact_lights(s, at);
+    }
+    if (RATIO != 0u) {
+        known += push.offset;
+        sum = max(sum + known, 0.0) / known;
     }
     store(p, l, sum);
 }

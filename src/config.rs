@@ -20,11 +20,47 @@ pub enum Estimator {
     /// Reflectance importance sampling with independent random points (Bagher 2011, section 3.3).
     BrdfRandom,
     /// None: the environment is convolved beforehand with lobes by concentration, and each sample looks it up under the lobes of
-    /// its material. Free of noise, at [`Rate::Full`] only, for GGX, Blinn-Phong and vMF, with points and directions as lights.
+    /// its material. Free of noise, at [`Rate::Full`] only, with points and directions as lights.
     Preconvolved,
+    /// That, and what the lobes leave of the reflectance estimated as [`Self::Mis`] does: they are its control variate, so that the
+    /// mean is right. At [`Rate::Full`] only.
+    Cv,
+    /// The same, but as factors on what is looked up, which up-sampling carries instead of radiance, and only where a fit's error
+    /// says that it is worth it ([`Config::residual_errors`]).
+    Residual,
     /// No estimate: reflectance and radiance looked up in hashed directions and summed. Its time is the least that any
     /// estimator with as many directions can take on a device.
     Lookup,
+}
+
+impl Estimator {
+    /// The name by which it is asked for.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Mis => "mis",
+            Self::Brdf => "brdf",
+            Self::BrdfRandom => "brdf-random",
+            Self::Preconvolved => "preconvolved",
+            Self::Cv => "cv",
+            Self::Residual => "residual",
+            Self::Lookup => "lookup",
+        }
+    }
+
+    /// Whether light is looked up under lobes that stand for materials.
+    pub fn looks_up(self) -> bool {
+        matches!(self, Self::Preconvolved | Self::Cv | Self::Residual)
+    }
+
+    /// Whether what those leave is estimated.
+    pub fn has_residual(self) -> bool {
+        matches!(self, Self::Cv | Self::Residual)
+    }
+
+    /// Whether directions are drawn from reflectance and lights both.
+    pub(crate) fn combines(self) -> bool {
+        self == Self::Mis || self.has_residual()
+    }
 }
 
 /// Where samples are shaded. Levels are of output pixels: 0 is a pixel, +1 is 2x2 coarser; the samples of a pixel are at
@@ -40,7 +76,8 @@ pub enum Rate {
     Uniform(u32),
     /// A level for each sample, from [`crate::FrameInputs::levels`].
     Given,
-    /// The level at which the predicted bandwidth of the image asks for samples (Bagher 2011).
+    /// The level at which the predicted bandwidth of the image asks for samples (Bagher 2011); of [`Estimator::Residual`], that which
+    /// the error of the material's fit asks for.
     Bandwidth,
     /// Level 0, 1 or 2 by the contrast of the frame before ([`crate::frequency::luminance`]); the first frame, and the first after
     /// [`crate::Renderer::resize`], has level 0.
@@ -84,6 +121,9 @@ pub enum GBufferSource {
         layout: vk::DescriptorSetLayout,
     },
 }
+
+/// [`Config::residual_errors`] unless they are set.
+const RESIDUAL_ERRORS: [f32; 3] = [0.0, 0.1, 0.25];
 
 /// Levels over a sample that a frame can have.
 pub(crate) const MAX_LEVEL: u32 = 5;
@@ -129,10 +169,16 @@ pub struct Config {
     pub literal_lobes: bool,
     /// Whether the mesh's curvature widens lobes as [`Filter::Tk`] does, whatever the filter.
     pub geometric: bool,
-    /// Directions a shaded sample, 1 to 65536; at least 2 for [`Estimator::Mis`]. Where [`Rate::Bandwidth`] chooses among several
+    /// Directions a shaded sample, 1 to 65536; at least 2 where [`Estimator`] combines two kinds. Where [`Rate::Bandwidth`] chooses among several
     /// samples a pixel, whatever stands for a pixel or more gets [`Config::samples_per_side`] times as many, and each finer level a
     /// quarter of the level above.
     pub directions: u32,
+    /// Errors of a fit up to which the residual of [`Estimator::Residual`] is left out; with [`Rate::Bandwidth`] is shaded at the
+    /// coarsest level; is shaded at that of half the pixels a side. Beyond it is shaded at every sample.
+    pub residual_errors: [f32; 3],
+    /// Whether lobes are taken to be what look-ups of them hold, texel by texel, and none to be sharper than the sharpest level: with
+    /// [`Estimator::Cv`] nothing is left that makes its mean wrong, at several times the cost. To test with.
+    pub exact_lobes: bool,
     /// How shaded samples share them. All but [`Allocation::Constant`] need [`Rate::Bandwidth`], whose prediction they go by, and
     /// levels above a sample; `directions` is the mean then.
     pub allocation: Allocation,
@@ -167,11 +213,18 @@ impl Config {
             literal_lobes: false,
             geometric: false,
             directions: 64,
+            residual_errors: RESIDUAL_ERRORS,
+            exact_lobes: false,
             allocation: Allocation::default(),
             curvature: false,
             gbuffer: GBufferSource::default(),
             modules: Modules::default(),
         }
+    }
+
+    /// Whether levels follow from the predicted bandwidth of the image.
+    pub(crate) fn predicts(&self) -> bool {
+        self.rate == Rate::Bandwidth && !self.estimator.looks_up()
     }
 
     /// Whether the mesh's curvature widens lobes.
@@ -240,13 +293,15 @@ impl Config {
             "at most 16384 samples a side where samples are not all shaded",
             most.to_string(),
         )?;
-        let looked_up = self.estimator == Estimator::Preconvolved;
+        let everywhere = matches!(self.estimator, Estimator::Preconvolved | Estimator::Cv);
         check(
-            !looked_up || self.rate == Rate::Full,
+            !everywhere || self.rate == Rate::Full,
             "rate",
-            "Full, as the estimator is Preconvolved",
+            &format!("Full, as the estimator is {:?}", self.estimator),
             format!("{:?}", self.rate),
         )?;
+        let ascending = self.residual_errors.is_sorted() && self.residual_errors.iter().all(|e| e.is_finite());
+        check(ascending, "residual_errors", "three finite numbers in ascending order", format!("{:?}", self.residual_errors))?;
         check((1..=256).contains(&self.probes), "probes", "1 to 256", self.probes.to_string())?;
         check((1..=16).contains(&self.anisotropy), "anisotropy", "1 to 16", self.anisotropy.to_string())?;
         if self.bins == Bins::Camera {
@@ -263,7 +318,7 @@ impl Config {
         check((1e-3..=0.1).contains(&self.eps), "eps", "0.001 to 0.1", self.eps.to_string())?;
         let rate = self.samples_per_cycle.unwrap_or(1.0);
         check(rate > 0.0 && rate.is_finite(), "samples_per_cycle", "a finite number > 0", rate.to_string())?;
-        let least = if self.estimator == Estimator::Mis { 2 } else { 1 };
+        let least = if self.estimator.combines() { 2 } else { 1 };
         check(
             (least..=65536).contains(&self.directions),
             "directions",
@@ -272,10 +327,10 @@ impl Config {
         )?;
         let weighed = self.allocation != Allocation::Constant;
         check(
-            !weighed || self.rate == Rate::Bandwidth,
+            !weighed || self.predicts(),
             "allocation",
-            "constant, unless the rate is bandwidth",
-            format!("{} at the rate {:?}", self.allocation.name(), self.rate),
+            "constant, unless the rate is bandwidth and the estimator no residual's",
+            format!("{} at the rate {:?} with {}", self.allocation.name(), self.rate, self.estimator.name()),
         )?;
         check(
             !weighed || self.coarsest() > 0,

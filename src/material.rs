@@ -1,7 +1,7 @@
 //! A reflectance and the textures that vary it over a surface; the f64 twin of looking them up.
 
-use crate::distribution::Surface;
 use crate::distribution::surface::FoundLobes;
+use crate::distribution::{LobeFit, Surface};
 use crate::error::{Error, Result};
 use crate::frequency::wavelet::Grid;
 use crate::frequency::{TextureBandwidth, TextureCells};
@@ -72,6 +72,9 @@ pub struct Material {
     pub maps: Maps,
     /// How fast its lobes vary, if that is known; analysed when it is needed otherwise (a second for a table).
     pub lobe_bandwidth: Option<Arc<LobeBandwidth>>,
+    /// The lobes that stand for it where light is looked up, if they are known; fitted when they are needed otherwise (seconds for a
+    /// table).
+    pub lobe_fit: Option<Arc<LobeFit>>,
 }
 
 impl From<Model> for Material {
@@ -113,7 +116,7 @@ pub fn geometric_kernel(dx: DVec3, dy: DVec3) -> f64 {
 impl Material {
     /// A reflectance with maps.
     pub fn new(model: Model, maps: Maps) -> Self {
-        Self { model, maps, lobe_bandwidth: None }
+        Self { model, maps, lobe_bandwidth: None, lobe_fit: None }
     }
 
     /// Refuses parameters and maps that the model does not take.

@@ -6,9 +6,10 @@ use crate::frequency::allocation::Allocation;
 use crate::gpu::pipeline::BridgeLayouts;
 use crate::gpu::retire::{Build, Retired};
 use crate::pass::gbuffer::GBuffer;
+use crate::pass::materials::Kinds;
 use crate::pass::{
     PassContext, allocate, bandwidth, base, brdf_map, classify, curvature, environment_bandwidth, luminance, prefilter, pyramid,
-    resolve, shade, texture_space, tonemap, upsample, vmf_mips,
+    residual_level, resolve, shade, texture_space, tonemap, upsample, vmf_mips,
 };
 use ash::vk;
 
@@ -23,22 +24,46 @@ pub(crate) struct Passes {
     pub gbuffer: Option<GBuffer>,
     pub curvature: Option<curvature::Curvature>,
     pub bandwidth: Option<bandwidth::Bandwidth>,
+    /// Where the errors of fits make levels.
+    pub residual_level: Option<residual_level::ResidualLevel>,
     pub luminance: Option<luminance::Luminance>,
     pub pyramid: Option<pyramid::Pyramid>,
-    /// Pre-convolved light, or else samples that are listed and shaded.
-    pub base: Option<base::Base>,
-    pub sampled: Option<Sampled>,
+    /// Where directions are drawn.
+    pub classify: Option<classify::Classify>,
+    /// Where samples have numbers of directions of their own.
+    pub allocate: Option<allocate::Allocate>,
     pub upsample: Option<upsample::Upsample>,
     pub resolve: resolve::Resolve,
     pub tonemap: tonemap::Tonemap,
 }
 
-/// What draws directions.
-pub(crate) struct Sampled {
-    pub classify: classify::Classify,
-    /// Where samples have numbers of directions of their own.
-    pub allocate: Option<allocate::Allocate>,
-    pub shade: shade::Shade,
+/// Passes that are compiled for the kinds of materials that there are.
+pub(crate) struct OfKinds {
+    pub kinds: Kinds,
+    /// Where light is looked up.
+    pub base: Option<base::Base>,
+    /// Where directions are drawn.
+    pub shade: Option<shade::Shade>,
+}
+
+impl OfKinds {
+    pub fn new(p: &mut PassContext<'_, '_>, config: &Config, kinds: Kinds) -> Result<Self> {
+        let (looked_up, drawn) = (config.estimator.looks_up(), config.estimator != Estimator::Preconvolved);
+        Ok(Self {
+            kinds,
+            base: looked_up.then(|| base::Base::new(p, config, kinds)).transpose()?,
+            shade: drawn.then(|| shade::Shade::new(p, config, config.coarsest() > 0, kinds)).transpose()?,
+        })
+    }
+
+    pub fn retire(self, bag: &mut Retired) {
+        if let Some(pass) = self.base {
+            pass.retire(bag);
+        }
+        if let Some(pass) = self.shade {
+            pass.retire(bag);
+        }
+    }
 }
 
 impl Passes {
@@ -50,16 +75,10 @@ impl Passes {
             GBufferSource::Host { .. } => None,
         };
         p.bridge.gbuffer = layout(&gbuffer, config);
-        let (top, predicted) = (config.coarsest(), config.rate == Rate::Bandwidth);
-        let looked_up = config.estimator == Estimator::Preconvolved;
-        let sampled = |p: &mut PassContext<'_, '_>| -> Result<Sampled> {
-            let allocated = config.allocation != Allocation::Constant;
-            Ok(Sampled {
-                classify: classify::Classify::new(p, top, predicted)?,
-                allocate: allocated.then(|| allocate::Allocate::new(p, config)).transpose()?,
-                shade: shade::Shade::new(p, config, top > 0)?,
-            })
-        };
+        let (top, predicted) = (config.coarsest(), config.predicts());
+        let by_fits = config.rate == Rate::Bandwidth && !predicted;
+        let (looked_up, drawn) = (config.estimator.looks_up(), config.estimator != Estimator::Preconvolved);
+        let allocated = config.allocation != Allocation::Constant;
         Ok(Self {
             environment_bandwidth: predicted
                 .then(|| environment_bandwidth::EnvironmentBandwidth::new(&mut p, config.eps))
@@ -73,12 +92,13 @@ impl Passes {
             gbuffer,
             curvature: config.curvature.then(|| curvature::Curvature::new(&mut p)).transpose()?,
             bandwidth: predicted.then(|| bandwidth::Bandwidth::new(&mut p, config)).transpose()?,
+            residual_level: by_fits.then(|| residual_level::ResidualLevel::new(&mut p, config)).transpose()?,
             luminance: (top > 0 && config.rate == Rate::Luminance).then(|| luminance::Luminance::new(&mut p)).transpose()?,
             pyramid: (top > 0).then(|| pyramid::Pyramid::new(&mut p, top)).transpose()?,
-            base: looked_up.then(|| base::Base::new(&mut p, config)).transpose()?,
-            sampled: (!looked_up).then(|| sampled(&mut p)).transpose()?,
+            classify: drawn.then(|| classify::Classify::new(&mut p, top, predicted)).transpose()?,
+            allocate: allocated.then(|| allocate::Allocate::new(&mut p, config)).transpose()?,
             upsample: (top > 0).then(|| upsample::Upsample::new(&mut p, top)).transpose()?,
-            resolve: resolve::Resolve::new(&mut p)?,
+            resolve: resolve::Resolve::new(&mut p, config)?,
             tonemap: tonemap::Tonemap::new(&mut p)?,
         })
     }
@@ -106,21 +126,20 @@ impl Passes {
         if let Some(pass) = self.bandwidth {
             pass.retire(bag);
         }
+        if let Some(pass) = self.residual_level {
+            pass.retire(bag);
+        }
         if let Some(pass) = self.luminance {
             pass.retire(bag);
         }
         if let Some(pass) = self.pyramid {
             pass.retire(bag);
         }
-        if let Some(pass) = self.base {
+        if let Some(pass) = self.classify {
             pass.retire(bag);
         }
-        if let Some(Sampled { classify, allocate, shade }) = self.sampled {
-            classify.retire(bag);
-            if let Some(pass) = allocate {
-                pass.retire(bag);
-            }
-            shade.retire(bag);
+        if let Some(pass) = self.allocate {
+            pass.retire(bag);
         }
         if let Some(pass) = self.upsample {
             pass.retire(bag);

@@ -28,6 +28,8 @@ pub(crate) struct Plan {
     pub allocated: bool,
     /// Linear radiance: of samples, and below them of cells of even levels.
     pub radiance: ImageDesc,
+    /// Linear radiance that is looked up, where `radiance` is what is left.
+    pub base: Option<ImageDesc>,
     /// Linear radiance of cells of odd levels, one level below another.
     pub odd: Option<ImageDesc>,
     pub resolved: ImageDesc,
@@ -145,12 +147,13 @@ impl Plan {
             curvature: config.curvature.then(|| image("curvature", vk::Format::R16G16B16A16_SFLOAT, shading, storage)),
             level: (levels.top > 0 && config.rate != Rate::Given)
                 .then(|| image("level", vk::Format::R32_UINT, shading, storage | vk::ImageUsageFlags::TRANSFER_DST)),
-            prediction: (config.rate == Rate::Bandwidth).then(|| {
+            prediction: config.predicts().then(|| {
                 let blocks = shading.map(|e| e.div_ceil(config.block_side()));
                 image("prediction", vk::Format::R16G16B16A16_SFLOAT, blocks, storage | vk::ImageUsageFlags::TRANSFER_DST)
             }),
             allocated: config.allocation != Allocation::Constant,
             radiance: values("radiance", shading[0], even_rows),
+            base: config.estimator.has_residual().then(|| values("base", shading[0], shading[1])),
             odd: (levels.top > 0).then(|| values("odd", shading[0].div_ceil(2), odd_rows)),
             levels,
             resolved: image("resolved", vk::Format::R32G32B32A32_SFLOAT, config.extent, storage),
@@ -158,7 +161,7 @@ impl Plan {
     }
 
     fn images(&self) -> impl Iterator<Item = &ImageDesc> {
-        let values = self.level.iter().chain(&self.prediction).chain(&self.odd).chain([
+        let values = self.level.iter().chain(&self.prediction).chain(&self.odd).chain(&self.base).chain([
             &self.normals,
             &self.factors,
             &self.lobes,
@@ -224,7 +227,7 @@ impl Directions {
     /// `area_lights`, at least one each. Twin of `split` in `glsl/shade.comp`.
     pub fn split(config: &Config, n: u32, environment: bool, area_lights: u32) -> Self {
         let sources = u32::from(environment) + area_lights;
-        if config.estimator != crate::Estimator::Mis || sources == 0 {
+        if !config.estimator.combines() || sources == 0 {
             return Self { brdf: n, environment: 0, light: 0 };
         }
         let light = if area_lights > 0 { (n / 2 / sources).max(1) } else { 0 };

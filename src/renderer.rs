@@ -19,14 +19,18 @@ use crate::pass::gbuffer;
 use crate::pass::materials::{MaterialBridge, MaterialImages};
 use crate::pass::object_cells::ObjectCells;
 use crate::pass::{
-    FrameUniform, allocate, bandwidth, base, classify, curvature, filter, level, luminance, pyramid, resolve, shade,
-    texture_space, tonemap, upsample, vmf_mips,
+    FrameUniform, allocate, bandwidth, base, classify, curvature, filter, level, luminance, pyramid, residual_level, resolve,
+    shade, texture_space, tonemap, upsample, vmf_mips,
 };
-use crate::passes::{Passes, Sampled};
+use crate::passes::{OfKinds, Passes};
 use crate::plan::{Directions, LIGHT_BYTES};
 use crate::targets::Targets;
 use ash::vk;
 use glam::Mat3;
+
+/// Of the mean luminance of the environment: what is added on both sides of a factor on light that is looked up, so that factors stay
+/// small where there is little of it.
+const FACTOR_OFFSET: f64 = 0.02;
 
 /// Says so when a renderer is dropped instead of destroyed: its handles leak, since submitted work may still use them.
 struct Undestroyed;
@@ -35,6 +39,13 @@ impl Drop for Undestroyed {
     fn drop(&mut self) {
         log::error!("a renderer was dropped without `destroy` and its handles leak");
     }
+}
+
+/// Materials, with the passes that are compiled for their maps and for their kinds.
+pub(crate) struct Surfaces {
+    pub images: MaterialImages,
+    pub filter: filter::Filter,
+    pub of_kinds: OfKinds,
 }
 
 /// The renderer: records frames into the host's command buffers. It never submits and never waits.
@@ -56,8 +67,7 @@ pub struct Renderer {
     /// Whether `targets` hold a frame.
     shown: bool,
     pub(crate) environment: Option<EnvironmentImages>,
-    /// With the pass that is compiled for their maps.
-    pub(crate) materials: Option<(MaterialImages, filter::Filter)>,
+    pub(crate) materials: Option<Surfaces>,
     /// Of objects, where these have some of their own.
     pub(crate) cells: Option<ObjectCells>,
     undestroyed: Undestroyed,
@@ -127,7 +137,8 @@ impl Renderer {
     pub unsafe fn record(&mut self, cmd: vk::CommandBuffer, inputs: &FrameInputs<'_>) -> Result<()> {
         inputs.check(&self.config, self.targets.plan.shading)?;
         let before = "record_environment and record_materials";
-        let (Some(environment), Some((materials, filter))) = (&self.environment, &self.materials) else {
+        let (Some(environment), Some(Surfaces { images: materials, filter, of_kinds })) = (&self.environment, &self.materials)
+        else {
             return Err(Error::CallOrder { called: "record", before });
         };
         if let GBufferInput::Draws(draws) = inputs.gbuffer {
@@ -212,6 +223,11 @@ impl Renderer {
                 rec.image(level, Access::COMPUTE_SAMPLED);
                 Some(level.view)
             }
+            (Some(level), _) if let (Some(pass), Some(fits)) = (&passes.residual_level, &materials.fits) => {
+                pass.record(rec, &residual_level::Io { frame, bridge, samplers, normals, materials, fits, level });
+                rec.image(level, Access::COMPUTE_SAMPLED);
+                Some(level.view)
+            }
             (Some(level), _) => {
                 match (&passes.luminance, &targets.luminance) {
                     (Some(pass), Some([tiles, mean])) if self.shown => {
@@ -249,22 +265,48 @@ impl Renderer {
             from = classify::From::Cells(cells, &buffers.weights, forecast.map(|f| (f, bandwidth::OF_SAMPLES)));
         }
 
-        let radiance = &targets.radiance;
-        if let Some(Sampled { classify, allocate, shade }) = &passes.sampled {
-            // 6  Which samples to shade.
-            let (arguments, list) = (&targets.arguments, &targets.list);
+        // 6  Which samples to shade.
+        let (arguments, list) = (&targets.arguments, &targets.list);
+        if let Some(classify) = &passes.classify {
             classify.record(rec, &classify::Io { frame, bridge, from, arguments, list });
-            let directions = Directions::of(&self.config, inputs.environment.intensity > 0.0, area);
-            let mut to_shade = list;
-            if let (Some(pass), Some(buffers), Some(prediction)) = (allocate, &targets.allocation, &targets.prediction) {
-                let prediction = &prediction.image;
-                let sources = area + u32::from(directions.environment > 0);
-                pass.record(rec, &allocate::Io { samplers, prediction, arguments, list, sources, buffers });
-                to_shade = &buffers.list;
-            }
+        }
+        let directions = Directions::of(&self.config, inputs.environment.intensity > 0.0, area);
+        let mut to_shade = list;
+        if let (Some(pass), Some(buffers), Some(prediction)) = (&passes.allocate, &targets.allocation, &targets.prediction) {
+            let prediction = &prediction.image;
+            let sources = area + u32::from(directions.environment > 0);
+            pass.record(rec, &allocate::Io { samplers, prediction, arguments, list, sources, buffers });
+            to_shade = &buffers.list;
+        }
 
-            // 8  Their radiance.
-            shade.record(
+        // 7  Radiance of all, from pre-convolved light.
+        let (radiance, light_count) = (&targets.radiance, exact + area);
+        if let (Some(pass), Some(prefiltered), Some(fits)) = (&of_kinds.base, &environment.prefiltered, &materials.fits) {
+            pass.record(
+                rec,
+                &base::Io {
+                    frame,
+                    bridge,
+                    samplers,
+                    normals,
+                    factors,
+                    lobes,
+                    prefiltered,
+                    materials,
+                    fits,
+                    lights,
+                    light_count,
+                    radiance: targets.base.as_ref().unwrap_or(radiance),
+                },
+            );
+        }
+
+        // 8  Radiance of the samples to shade, or what the base leaves of it.
+        let offset = (FACTOR_OFFSET * environment.mean * f64::from(inputs.environment.intensity)).max(1e-6) as f32;
+        if let Some(pass) = &of_kinds.shade {
+            let known = targets.base.as_ref().zip(materials.fits.as_ref()).zip(environment.prefiltered.as_ref());
+            let residual = known.map(|((base, fits), light)| shade::Residual { base, fits, suns: &light.suns, offset });
+            pass.record(
                 rec,
                 &shade::Io {
                     frame,
@@ -278,30 +320,11 @@ impl Renderer {
                     arguments,
                     list: to_shade,
                     lights,
-                    light_count: exact + area,
+                    light_count,
                     directions,
+                    residual,
                     radiance,
                     odd: targets.odd.as_ref(),
-                },
-            );
-        }
-        // 7  Or the radiance of all, from pre-convolved light.
-        if let (Some(pass), Some(prefiltered)) = (&passes.base, &environment.prefiltered) {
-            let light_count = exact + area;
-            pass.record(
-                rec,
-                &base::Io {
-                    frame,
-                    bridge,
-                    samplers,
-                    normals,
-                    factors,
-                    lobes,
-                    prefiltered,
-                    materials,
-                    lights,
-                    light_count,
-                    radiance,
                 },
             );
         }
@@ -311,8 +334,8 @@ impl Renderer {
         }
 
         // 9  The output.
-        let resolved = &targets.resolved;
-        passes.resolve.record(rec, &resolve::Io { frame, bridge, samplers, environment, radiance, resolved });
+        let (resolved, base) = (&targets.resolved, targets.base.as_ref().map(|base| (base, offset)));
+        passes.resolve.record(rec, &resolve::Io { frame, bridge, samplers, environment, radiance, base, resolved });
         if let Some(Output { image, transfer }) = &inputs.output {
             passes.tonemap.record(rec, &tonemap::Io { samplers, resolved, target: image, transfer: *transfer });
             rec.release(image);
@@ -367,8 +390,9 @@ impl Renderer {
         if let Some(cells) = self.cells {
             cells.retire(&mut self.states, &mut bag);
         }
-        if let Some((materials, filter)) = self.materials {
-            materials.retire(&mut self.states, &mut bag);
+        if let Some(Surfaces { images, filter, of_kinds }) = self.materials {
+            images.retire(&mut self.states, &mut bag);
+            of_kinds.retire(&mut bag);
             filter.retire(&mut bag);
         }
         self.targets.retire(&mut self.states, &mut bag);

@@ -1,6 +1,6 @@
 //! What is recorded when something changes: the environment, the materials.
 
-use crate::config::{Bins, Estimator, Rate};
+use crate::config::Bins;
 use crate::distribution::effective::Rule;
 use crate::error::{Error, Result};
 use crate::gpu::memory::HostAllocator;
@@ -12,11 +12,11 @@ use crate::material::Material;
 use crate::pass::environment::{Analyses, EnvironmentUpload};
 use crate::pass::gbuffer::{self, Draw};
 use crate::pass::maps::Reading;
-use crate::pass::materials::MaterialsUpload;
+use crate::pass::materials::{MaterialsUpload, Uploading};
 use crate::pass::object_cells::{ObjectCells, Seats};
-use crate::pass::{PassContext, base, brdf_map, filter, vmf_mips};
-use crate::passes::layout;
-use crate::renderer::Renderer;
+use crate::pass::{PassContext, brdf_map, filter, vmf_mips};
+use crate::passes::{OfKinds, layout};
+use crate::renderer::{Renderer, Surfaces};
 use crate::sampling::LatLong;
 use ash::vk;
 
@@ -35,8 +35,11 @@ impl Renderer {
         map: &LatLong,
         memory: &mut dyn HostAllocator,
     ) -> Result<Retired> {
-        let passes =
-            Analyses { bandwidth: self.passes.environment_bandwidth.as_ref(), prefilter: self.passes.prefilter.as_ref() };
+        let passes = Analyses {
+            bandwidth: self.passes.environment_bandwidth.as_ref(),
+            prefilter: self.passes.prefilter.as_ref(),
+            rest: self.config.estimator.has_residual(),
+        };
         let upload = Build::run(&self.cx, memory, |build| EnvironmentUpload::new(build, map, passes, &self.samplers))?;
         let mut bag = Retired::default();
         let mut rec = Recorder::new(&self.cx, cmd, 0, &mut self.states, None);
@@ -68,16 +71,16 @@ impl Renderer {
         let (modules, slots, widened) = (&config.modules, config.frames_in_flight, config.widened());
         let (filter, bins) = (self.config.filter, self.config.bins);
         let (passes, samplers) = (self.passes.moments.as_ref(), &self.samplers);
-        let eps = (self.config.rate == Rate::Bandwidth).then_some(self.config.eps);
-        if self.config.estimator == Estimator::Preconvolved {
-            base::check_materials(materials)?;
-        }
-        let (mut upload, filter) = Build::run(&self.cx, memory, |build| {
+        let (eps, estimator) = (config.predicts().then_some(config.eps), config.estimator);
+        let kept = self.materials.as_ref().map(|m| m.of_kinds.kinds);
+        let (mut upload, filter, of_kinds) = Build::run(&self.cx, memory, |build| {
             let reading = Reading { filter, bins, rule, widened, passes, samplers };
-            let upload = MaterialsUpload::new(build, materials, &reading, eps)?;
+            let upload = MaterialsUpload::new(build, materials, &Uploading { reading, eps, estimator })?;
             let mut p = PassContext { build, modules, bridge, slots };
             let filter = filter::Filter::new(&mut p, config, upload.uses())?;
-            Ok((upload, filter))
+            let fresh = kept != Some(upload.kinds);
+            let of_kinds = fresh.then(|| OfKinds::new(&mut p, config, upload.kinds)).transpose()?;
+            Ok((upload, filter, of_kinds))
         })?;
         let mut bag = Retired::default();
         self.set_up.restart(&self.cx, cmd, 0);
@@ -96,10 +99,20 @@ impl Renderer {
             // They are made from the former materials' lobes.
             former.retire(&mut self.states, &mut bag);
         }
-        if let Some((former, pass)) = self.materials.replace((fresh, filter)) {
-            former.retire(&mut self.states, &mut bag);
-            pass.retire(&mut bag);
+        let former = self.materials.take();
+        let (former, kept) = former.map(|m| ((m.images, m.filter), m.of_kinds)).unzip();
+        if let Some((images, filter)) = former {
+            images.retire(&mut self.states, &mut bag);
+            filter.retire(&mut bag);
         }
+        let (of_kinds, unused) = match of_kinds {
+            Some(fresh) => (Some(fresh), kept),
+            None => (kept, None),
+        };
+        if let Some(unused) = unused {
+            unused.retire(&mut bag);
+        }
+        self.materials = of_kinds.map(|of_kinds| Surfaces { images: fresh, filter, of_kinds });
         Ok(bag)
     }
 
@@ -113,7 +126,7 @@ impl Renderer {
     pub fn reserve_cells(&mut self, draws: &[Draw], memory: &mut dyn HostAllocator) -> Result<Retired> {
         let mut bag = Retired::default();
         let (Bins::Camera, Some((_, mips))) = (self.config.bins, &self.passes.moments) else { return Ok(bag) };
-        let Some((materials, _)) = &self.materials else {
+        let Some(Surfaces { images: materials, .. }) = &self.materials else {
             return Err(Error::CallOrder { called: "reserve_cells", before: "record_materials" });
         };
         gbuffer::check(draws)?;
@@ -131,7 +144,7 @@ impl Renderer {
     /// Texels of the map of which each draw of a material makes cells of its own, if it does: what
     /// [`chart::check`](crate::distribution::chart::check) takes.
     pub fn cell_map(&self, material: u32) -> Option<[u32; 2]> {
-        Some(self.materials.as_ref()?.0.maps.divided(material)?.size)
+        Some(self.materials.as_ref()?.images.maps.divided(material)?.size)
     }
 
     /// GPU times of the last [`Self::record_materials`], which has run; `None` without timestamps.

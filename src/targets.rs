@@ -29,6 +29,8 @@ pub(crate) struct Targets {
     pub luminance: Option<[Buffer; 2]>,
     pub cells: Option<CellBuffers>,
     pub radiance: Image,
+    /// What is looked up, where `radiance` is what is left.
+    pub base: Option<Image>,
     /// Radiance of odd levels.
     pub odd: Option<Image>,
     pub resolved: Image,
@@ -95,6 +97,7 @@ impl Targets {
                 .transpose()?,
             cells: (plan.levels.top > 0).then(|| CellBuffers::new(build, &plan)).transpose()?,
             radiance: Image::new(build, plan.radiance)?,
+            base: plan.base.map(|desc| Image::new(build, desc)).transpose()?,
             odd: plan.odd.map(|desc| Image::new(build, desc)).transpose()?,
             resolved: Image::new(build, plan.resolved)?,
             arguments: Buffer::new(build, "arguments", ARGUMENT_BYTES, arguments, Location::Device)?,
@@ -109,7 +112,7 @@ impl Targets {
     pub fn image(&self, name: &str) -> Option<&Image> {
         let gbuffer = self.gbuffer.as_ref().map(GBufferImages::colors);
         let prediction = self.prediction.as_ref().map(|p| &p.image);
-        let own = [&self.curvature, &self.level, &self.odd].into_iter().flatten().chain(prediction);
+        let own = [&self.curvature, &self.level, &self.base, &self.odd].into_iter().flatten().chain(prediction);
         let always = [&self.normals, &self.factors, &self.lobes, &self.radiance, &self.resolved];
         let all = gbuffer.into_iter().flatten().chain(own).chain(always);
         all.into_iter().find(|image| image.desc.name == name)
@@ -134,7 +137,7 @@ impl Targets {
     pub fn retire(self, states: &mut States, bag: &mut Retired) {
         let images = self.gbuffer.into_iter().flat_map(GBufferImages::into_images);
         let (prediction, predicted) = self.prediction.map(|p| (p.image, vec![p.forecast, p.blocks])).unzip();
-        let own = [self.curvature, self.level, prediction, self.odd].into_iter().flatten();
+        let own = [self.curvature, self.level, prediction, self.base, self.odd].into_iter().flatten();
         for image in images.chain(own).chain([self.normals, self.factors, self.lobes, self.radiance, self.resolved]) {
             states.forget(image.handle);
             image.retire(bag);

@@ -254,6 +254,7 @@ fn normals_and_roughness_come_from_level_0_and_colours_through_mips() {
     let alphas: Vec<_> = (0..16).map(|i| if i % 2 == 0 { 0.25 } else { 0.75 }).collect();
     let material = Material {
         lobe_bandwidth: None,
+        lobe_fit: None,
         model: ggx(),
         maps: Maps {
             albedo: Some(Arc::new(Texture::colour(size, &checks).unwrap())),
@@ -317,6 +318,7 @@ fn classes_share_what_is_the_same() {
     let n = of_size([8, 8], Format::Half2);
     let with = |albedo: &Arc<Texture>, normal: Option<&Arc<Texture>>| Material {
         lobe_bandwidth: None,
+        lobe_fit: None,
         model: ggx(),
         maps: Maps { albedo: Some(albedo.clone()), specular: Some(a.clone()), normal: normal.cloned(), ..Maps::default() },
     };

@@ -171,7 +171,7 @@ vec4 lobes_evaluate(Material m, Lobes l, vec3 wi, vec3 wo, vec3 h) {
         }
     }
     density *= 0.25 / (across * weights);
-    density = mix(density, wi.z * INV_PI, l.diffuse);
+    density = mix(density, max(wi.z, 0.0) * INV_PI, l.diffuse);
     vec3 f = m.record.f0.rgb;
     vec3 below = m.record.albedo.rgb;
     if (ggx) {
@@ -200,7 +200,7 @@ vec3 lobes_half(bool ggx, bool cosine, vec3 mu, float a, vec2 u) {
     return x * turn.x + y * turn.y + mu * (1.0 - t);
 }
 
-// A direction of light from two 32-bit numbers, of which the first also chooses the lobe. It may lie below the horizon.
+// A direction of light from two 32-bit numbers, of which the first also chooses the lobe. It may lie below the horizon; 0 if none is.
 vec3 lobes_sample(Material m, Lobes l, vec3 wo, uvec2 number) {
     vec2 u = vec2(to_unit(number.x), to_unit(number.y));
     if (u.x < l.diffuse) {
@@ -237,7 +237,7 @@ vec3 lobes_sample(Material m, Lobes l, vec3 wo, uvec2 number) {
         h = lobes_half(kind == REFLECTANCE_GGX, kind == REFLECTANCE_BLINN_PHONG, lobe_axis[chosen].xyz, lobe_shape[chosen].x, u);
     }
     float across = dot(wo, h);
-    return across > 0.0 ? h * (2.0 * across) - wo : vec3(0.0, 0.0, -1.0);
+    return across > 0.0 ? h * (2.0 * across) - wo : vec3(0.0);
 }
 
 #endif

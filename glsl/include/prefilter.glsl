@@ -34,6 +34,11 @@ vec3 prefiltered(vec3 w, float kappa) {
     return mix(b, a, weight) * frame.environment.y;
 }
 
+// Concentration of the sharpest level.
+float prefiltered_most() {
+    return 1.0 / prefilter.suns.scale.x;
+}
+
 // On a surface with world normal n.
 vec3 prefiltered_irradiance(vec3 n) {
     return textureLod(prefilter_irradiance, prefilter_uv(n), 0.0).rgb * frame.environment.y;

@@ -27,8 +27,10 @@ ReflectedLobe reflected_lobe(Material m, uint i, vec3 wo) {
         kappa = m.record.f0.a + 2.0;
         peak = m.peaks.x;
     } else {
-        vec3 mu = materials[m.record.kind.y + i].f0.xyz;
-        vec2 lobe = material_lobe(m, m.record.kind.y + i);
+        // Tables have none, and read what is there for nothing.
+        uint record = kind == REFLECTANCE_VMF ? m.record.kind.y + min(i, m.record.kind.z - 1u) : 0u;
+        vec3 mu = materials[record].f0.xyz;
+        vec2 lobe = material_lobe(m, record);
         kappa = lobe.x;
         peak = lobe.y;
         // The tangent frame's own handedness first, then the turn back.

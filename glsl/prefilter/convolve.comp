@@ -23,7 +23,7 @@ layout(push_constant) uniform Push {
 } push;
 
 // A lobe ends where e^-REACH is left of it.
-const float REACH = 7.0;
+const float REACH = 9.0;
 
 void main() {
     int columns = push.width, rows = columns >> 1;

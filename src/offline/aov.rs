@@ -34,7 +34,7 @@ pub enum Aov {
     Shaded,
     /// Directions drawn for the sample.
     Samples,
-    /// Radiance from pre-convolved light.
+    /// Radiance that is looked up: pre-convolved light, suns and exact lights.
     Base,
     /// Lobes that the filter found, 0 where the material's own stay.
     Lobes,
@@ -129,7 +129,6 @@ impl Aov {
     pub fn read(self, session: &mut Session, config: &Config) -> Result<Vec<Channel>> {
         let side = config.samples_per_side;
         let name = ALL.iter().find(|(_, a)| *a == self).map_or("", |(n, _)| n);
-        let looked_up = session.config().is_some_and(|config| config.estimator == Estimator::Preconvolved);
         let covered = Pixels::read(session, "ids", side)?;
         let mask = covered.map(|t| if t[0] == 0 { 0.0 } else { 1.0 });
         // Background texels are cleared to zero bits, which every float reads as 0.
@@ -172,10 +171,15 @@ impl Aov {
                 scalar(all.iter().zip(mask).map(|(v, mask)| if mask > 0.0 { *v } else { 0.0 }).collect())
             }
             Self::Base => {
-                if !looked_up {
-                    return Err(Error::argument("--aov base", "--estimator preconvolved beside it", "another estimator"));
-                }
-                let radiance = float("radiance", "RGB", 0, session)?;
+                let image = match config.estimator {
+                    Estimator::Preconvolved => "radiance",
+                    Estimator::Cv | Estimator::Residual => "base",
+                    _ => {
+                        let expected = "--estimator preconvolved, cv or residual beside it";
+                        return Err(Error::argument("--aov base", expected, config.estimator.name()));
+                    }
+                };
+                let radiance = float(image, "RGB", 0, session)?;
                 let covered = |(name, values): Channel| {
                     (name, values.iter().zip(&mask).map(|(v, m)| if *m > 0.0 { *v } else { 0.0 }).collect())
                 };

@@ -7,7 +7,7 @@ use crate::plan::Directions;
 use crate::{Config, Estimator};
 
 /// The samples that were shaded: x, y and the level over a sample of the cell that each stands for. Pre-convolved light shades
-/// all that are covered.
+/// all that are covered; residuals that are left out count as shaded.
 ///
 /// # Errors
 /// The device's, on read-back.

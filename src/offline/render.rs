@@ -238,13 +238,6 @@ pub(super) fn report(
 ) -> Stats {
     let constant = config.allocation == Allocation::Constant;
     let budget = if constant { taken } else { pixels.shaded * u64::from(config.directions) };
-    let estimator = match config.estimator {
-        Estimator::Mis => "mis",
-        Estimator::Brdf => "brdf",
-        Estimator::BrdfRandom => "brdf-random",
-        Estimator::Preconvolved => "preconvolved",
-        Estimator::Lookup => "lookup",
-    };
     let values = BTreeMap::from([
         ("rate", json!(settings.rate())),
         ("lmax", json!(config.lmax)),
@@ -258,7 +251,7 @@ pub(super) fn report(
         ("combine", json!(format!("{:?}", config.combine).to_lowercase())),
         ("eps", json!(config.eps)),
         ("geometric", json!(config.geometric)),
-        ("estimator", json!(estimator)),
+        ("estimator", json!(config.estimator.name())),
         ("samples", json!(settings.supersample.unwrap_or(config.directions))),
         ("np_rule", json!(config.allocation.name())),
         ("aa", json!(config.samples_per_side.pow(2))),

@@ -66,7 +66,7 @@ impl Session {
         let clock = Instant::now();
         let others = headless.live_bytes();
         let mut materials: Vec<_> = world.materials.iter().map(|m| m.surface()).collect();
-        if config.rate == crate::Rate::Bandwidth {
+        if config.predicts() {
             let folder = lobe_cache::cache_folder();
             let analyse = |m: &mut crate::Material| {
                 m.lobe_bandwidth = Some(Arc::new(lobe_cache::lobe_bandwidth(&m.model, config.eps, folder.as_deref())));

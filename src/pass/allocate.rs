@@ -2,7 +2,7 @@
 //! ([`crate::frequency::allocation`] has the rules): a histogram of weights, a share for each of its bins, and the list again with
 //! everyone's number, most first.
 
-use crate::config::{Config, Estimator};
+use crate::config::Config;
 use crate::error::Result;
 use crate::frequency::allocation::range;
 use crate::gpu::access::Access;
@@ -139,7 +139,7 @@ impl Allocate {
             side: config.block_side() as i32,
             by_level: config.allocation.by_level() as f32,
             budget: config.directions,
-            halves: config.estimator == Estimator::Mis,
+            halves: config.estimator.combines(),
         })
     }
 

@@ -1,5 +1,5 @@
-//! Pass 7: noise-free radiance at every sample, from the environment pre-convolved by the material's lobes
-//! ([`crate::distribution::reflected`] and [`crate::distribution::prefilter`] are the f64 twins).
+//! Pass 7: noise-free radiance at every sample, from the environment pre-convolved by the lobes that stand for the material
+//! ([`crate::distribution::fit`], [`crate::distribution::reflected`] and [`crate::distribution::prefilter`] are the f64 twins).
 
 use crate::config::Config;
 use crate::error::{Error, Result};
@@ -11,11 +11,9 @@ use crate::gpu::recorder::Recorder;
 use crate::gpu::retire::Retired;
 use crate::gpu::sampler::Samplers;
 use crate::light::Light;
-use crate::material::Material;
-use crate::pass::materials::MaterialImages;
+use crate::pass::materials::{Kinds, MaterialImages};
 use crate::pass::prefilter::Prefiltered;
 use crate::pass::{PassContext, shade};
-use crate::reflectance::Model;
 use ash::vk::DescriptorType as D;
 
 /// Pass, shader, label, timer and AOV name.
@@ -39,6 +37,7 @@ pub const INTERFACE: Interface = Interface {
         D::COMBINED_IMAGE_SAMPLER,
         D::STORAGE_BUFFER,
         D::COMBINED_IMAGE_SAMPLER,
+        D::STORAGE_BUFFER,
     ],
 };
 
@@ -52,6 +51,7 @@ pub(crate) struct Io<'a> {
     pub lobes: &'a Image,
     pub prefiltered: &'a Prefiltered,
     pub materials: &'a MaterialImages,
+    pub fits: &'a Buffer,
     /// Exact ones, as [`check_lights`] says.
     pub lights: &'a Buffer,
     pub light_count: u32,
@@ -62,18 +62,6 @@ pub(crate) struct Io<'a> {
 /// One pipeline for frames without lights beside the environment, one for frames with.
 pub(crate) struct Base([ComputePipeline; 2]);
 
-/// Refuses materials that have no lobes of their own.
-pub(crate) fn check_materials(materials: &[Material]) -> Result<()> {
-    let table = |m: &Material| matches!(m.model, Model::Table(_) | Model::Turned(_));
-    match materials.iter().position(table) {
-        Some(i) => {
-            let expected = "ggx, blinn_phong or vmf for pre-convolved light";
-            Err(Error::invalid(format!("materials[{i}].reflectance"), expected, "table"))
-        }
-        None => Ok(()),
-    }
-}
-
 /// Refuses lights that would have to be sampled.
 pub(crate) fn check_lights(lights: &[Light]) -> Result<()> {
     match lights.iter().position(Light::is_area) {
@@ -83,11 +71,12 @@ pub(crate) fn check_lights(lights: &[Light]) -> Result<()> {
 }
 
 impl Base {
-    pub fn new(p: &mut PassContext<'_, '_>, config: &Config) -> Result<Self> {
+    pub fn new(p: &mut PassContext<'_, '_>, config: &Config, kinds: Kinds) -> Result<Self> {
         let mut make = |lights| {
             // Constants 2 to 5 are of no use here.
             let own = [u32::from(config.widened()), lights, 0, 0, 0, 0];
-            let constants: Vec<_> = own.into_iter().chain(shade::lobe_constants(config, true)).collect();
+            let constants: Vec<_> =
+                own.into_iter().chain(shade::lobe_constants(config, kinds)).chain([u32::from(config.exact_lobes)]).collect();
             ComputePipeline::new(p.build, p.modules, &INTERFACE, p.bridge, p.slots, &constants)
         };
         Ok(Self([make(0)?, make(1)?]))
@@ -100,6 +89,7 @@ impl Base {
         rec.image(io.normals, Access::COMPUTE_SAMPLED);
         rec.image(io.factors, Access::COMPUTE_SAMPLED);
         rec.image(io.lobes, Access::COMPUTE_SAMPLED);
+        rec.buffer(io.fits, Access::COMPUTE_READ);
         rec.overwrite(io.radiance, Access::COMPUTE_WRITE);
         rec.flush();
         let [first, second, irradiance, suns] = io.prefiltered.resources(io.samplers);
@@ -114,6 +104,7 @@ impl Base {
             irradiance,
             suns,
             Resource::Sampled(io.lobes, io.samplers.nearest),
+            Resource::Buffer(io.fits),
         ];
         let pipeline = &self.0[usize::from(io.light_count > 0)];
         pipeline.bind(rec, io.bridge, &resources, &());

@@ -1,6 +1,7 @@
 //! Pass 0a: the distant environment, uploaded on change: radiance and sampling density in one image, what
 //! directions are drawn from in another.
 
+use crate::distribution::suns::Suns;
 use crate::error::{Error, Result};
 use crate::gpu::access::Access;
 use crate::gpu::image::{Image, ImageDesc};
@@ -24,7 +25,9 @@ const SLOTS_A_ROW: u32 = 1024;
 pub(crate) struct EnvironmentImages {
     /// RGBA32F: radiance; density over uv.
     pub map: Image,
-    /// RGBA32UI: the alias table of the texels, as `src/sampling/alias.rs` packs it.
+    /// The same without its suns, where these are lights of their own and directions are drawn from the rest.
+    pub rest: Option<Image>,
+    /// RGBA32UI: the alias table of the texels that directions are drawn from, as `src/sampling/alias.rs` packs it.
     pub alias: Image,
     /// R32F: cycles/radian around each direction, one value a 2x2 block of the map that is analysed; looked up with the map's
     /// own coordinates, nearest. None unless the frame predicts bandwidth.
@@ -40,11 +43,14 @@ pub(crate) struct EnvironmentImages {
 pub(crate) struct Analyses<'a> {
     pub bandwidth: Option<&'a EnvironmentBandwidth>,
     pub prefilter: Option<&'a Prefilter>,
+    /// Whether directions are drawn from what is left without suns.
+    pub rest: bool,
 }
 
 /// Created and filled, not yet recorded.
 pub(crate) struct EnvironmentUpload {
     map: ImageUpload,
+    rest: Option<ImageUpload>,
     alias: ImageUpload,
     bandwidth: Option<environment_bandwidth::Work>,
     prefiltered: Option<prefilter::Work>,
@@ -58,45 +64,57 @@ impl EnvironmentUpload {
         if brightest > 1e30 {
             return Err(Error::invalid("environment radiance", "at most 1e30", brightest));
         }
-        let importance = EnvironmentImportance::build(map)?;
-        let radiance: Vec<[f32; 4]> =
-            map.texels().iter().zip(importance.density_texels()).map(|(&[r, g, b], density)| [r, g, b, density]).collect();
+        let rest = passes.rest.then(|| Suns::of(map).removed(map));
+        let importance = EnvironmentImportance::build(rest.as_ref().unwrap_or(map))?;
+        let density = importance.density_texels();
+        let texels = |map: &LatLong| -> Vec<[f32; 4]> {
+            map.texels().iter().zip(&density).map(|(&[r, g, b], density)| [r, g, b, *density]).collect()
+        };
         let slots = importance.alias().packed();
         let desc = |name, format, [width, height]: [u32; 2]| {
             ImageDesc::new(name, format, [width, height, 1], vk::ImageUsageFlags::SAMPLED)
         };
-        let radiance_desc = desc("environment", vk::Format::R32G32B32A32_SFLOAT, [map.width(), map.height()]);
+        let radiance = |name| desc(name, vk::Format::R32G32B32A32_SFLOAT, [map.width(), map.height()]);
         let alias_desc =
             desc("environment alias", vk::Format::R32G32B32A32_UINT, [SLOTS_A_ROW, slots.len() as u32 / SLOTS_A_ROW]);
-        let upload = ImageUpload::new(build, radiance_desc, bytemuck::cast_slice(&radiance))?;
+        let upload = ImageUpload::new(build, radiance("environment"), bytemuck::cast_slice(&texels(map)))?;
+        let rest = rest
+            .map(|rest| ImageUpload::new(build, radiance("environment without suns"), bytemuck::cast_slice(&texels(&rest))))
+            .transpose()?;
         let bandwidth = passes.bandwidth.map(|pass| pass.prepare(build, samplers, map, &upload.image)).transpose()?;
         let prefiltered = passes.prefilter.map(|pass| pass.prepare(build, samplers, map, &upload.image)).transpose()?;
         let alias = ImageUpload::new(build, alias_desc, bytemuck::cast_slice(&slots))?;
-        Ok(Self { map: upload, alias, bandwidth, prefiltered, mean: map.mean_luminance() })
+        Ok(Self { map: upload, rest, alias, bandwidth, prefiltered, mean: map.mean_luminance() })
     }
 
     /// With the passes that it was created with.
     pub fn record(self, rec: &mut Recorder<'_>, passes: Analyses<'_>, bag: &mut Retired) -> EnvironmentImages {
         rec.begin(NAME);
         let (map, alias) = (self.map.record(rec, bag), self.alias.record(rec, bag));
+        let rest = self.rest.map(|rest| rest.record(rec, bag));
         rec.end();
         let io = environment_bandwidth::Io { map: &map };
         let bandwidth = self.bandwidth.zip(passes.bandwidth).map(|(work, pass)| pass.record(rec, &io, work, bag));
         let io = prefilter::Io { map: &map };
         let prefiltered = self.prefiltered.zip(passes.prefilter).map(|(work, pass)| pass.record(rec, &io, work, bag));
-        EnvironmentImages { map, alias, bandwidth, prefiltered, mean: self.mean }
+        EnvironmentImages { map, rest, alias, bandwidth, prefiltered, mean: self.mean }
     }
 }
 
 impl EnvironmentImages {
-    /// Declares both images sampled by the pass that is open.
+    /// Declares the images sampled by the pass that is open.
     pub fn sampled(&self, rec: &mut Recorder<'_>) {
-        rec.image(&self.map, Access::COMPUTE_SAMPLED);
-        rec.image(&self.alias, Access::COMPUTE_SAMPLED);
+        let all = [&self.map, &self.alias].into_iter().chain(&self.rest);
+        all.for_each(|image| rec.image(image, Access::COMPUTE_SAMPLED));
+    }
+
+    /// What directions are drawn from.
+    pub fn drawn(&self) -> &Image {
+        self.rest.as_ref().unwrap_or(&self.map)
     }
 
     pub fn retire(self, states: &mut States, bag: &mut Retired) {
-        for image in [self.map, self.alias].into_iter().chain(self.bandwidth) {
+        for image in [self.map, self.alias].into_iter().chain(self.rest).chain(self.bandwidth) {
             states.forget(image.handle);
             image.retire(bag);
         }

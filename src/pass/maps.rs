@@ -52,8 +52,6 @@ pub(crate) struct MapImages {
     moments: Vec<Option<MomentsPlace>>,
     /// What goes into the cells of each material's objects.
     divided: Vec<Option<Divided>>,
-    /// Whether there are materials whose lobes stay as they are, whatever the filter.
-    pub unfiltered: bool,
 }
 
 /// Where a material's moments are: class, first layer and number of layers, and the same of its cells.
@@ -100,7 +98,8 @@ pub(crate) struct MapsUpload {
     moments: Vec<Image>,
     places: Vec<Option<MomentsPlace>>,
     divided: Vec<Option<Divided>>,
-    unfiltered: bool,
+    /// Of each material, whether the filter finds its lobes.
+    pub found: Vec<bool>,
     pub uses: Uses,
     pub work: Option<(brdf_map::Work, vmf_mips::Work)>,
 }
@@ -257,7 +256,7 @@ impl MapsUpload {
         let places: Vec<_> = places.into_iter().map(|p| p.and_then(place)).collect();
 
         let divided = if camera { divided(materials, &bases, &places, &groups, classes.len())? } else { Vec::new() };
-        let (mut uses, mut unfiltered) = (Uses::default(), false);
+        let (mut uses, mut found) = (Uses::default(), Vec::new());
         let mut records = Vec::with_capacity(materials.len());
         for (((material, slots), base), place) in materials.iter().zip(slots).zip(bases).zip(&places) {
             let (moments, cells) = (place.map(|p| p.moments.0), place.and_then(|p| p.cells.map(|c| c.0)));
@@ -273,7 +272,7 @@ impl MapsUpload {
             let lone =
                 BaseLobes::of(&material.model, reading.rule).filter(|own| filters && own.upright() && own.lobes().len() == 1);
             let lobes = base.or(lone.map(Base::Lobes)).unwrap_or(Base::Normals);
-            unfiltered |= lobes.lobes().is_empty();
+            found.push(!lobes.lobes().is_empty());
             records.push(Record::of(material, &lobes, slots.map(code)));
         }
         let classes = classes.iter().map(|class| upload(build, class)).collect::<Result<Vec<_>>>()?;
@@ -292,7 +291,7 @@ impl MapsUpload {
         };
         let usage = vk::BufferUsageFlags::STORAGE_BUFFER;
         let records = BufferUpload::new(build, "maps", usage, bytemuck::cast_slice(&records))?;
-        Ok(Self { records, classes, moments, places, divided, unfiltered, uses, work })
+        Ok(Self { records, classes, moments, places, divided, found, uses, work })
     }
 
     pub fn record(self, rec: &mut Recorder<'_>, bag: &mut Retired) -> MapImages {
@@ -300,7 +299,7 @@ impl MapsUpload {
         let mut classes: Vec<_> = textures.collect();
         classes.extend(self.moments);
         let records = self.records.record(rec, bag);
-        MapImages { records, classes, moments: self.places, divided: self.divided, unfiltered: self.unfiltered }
+        MapImages { records, classes, moments: self.places, divided: self.divided }
     }
 }
 

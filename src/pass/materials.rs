@@ -1,5 +1,7 @@
 //! Pass 0b: reflectance tables and importance tables, uploaded on change (Bagher 2011, section 3.3).
 
+use crate::config::Estimator;
+use crate::distribution::{Filter, LobeFit};
 use crate::error::{Error, Result};
 use crate::gpu::access::Access;
 use crate::gpu::buffer::Buffer;
@@ -9,7 +11,8 @@ use crate::gpu::recorder::{Recorder, States};
 use crate::gpu::retire::{Build, Handle, Retired};
 use crate::gpu::sampler::Samplers;
 use crate::gpu::upload::{BufferUpload, ImageUpload};
-use crate::material::{MOST_KERNEL, Material};
+use crate::material::{MOST_KERNEL, Maps, Material};
+use crate::pass::fits::Packed;
 use crate::pass::maps::{MapImages, MapsUpload, Reading, Uses};
 use crate::pass::{brdf_map, vmf_mips};
 use crate::reflectance::ladder::{Ladder, own_square};
@@ -46,6 +49,18 @@ struct Record {
     texture_bandwidth: [f32; 4],
 }
 
+/// What kinds of materials there are: what passes are compiled for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Kinds {
+    /// Some whose lobes stay as they are, whatever the filter.
+    pub unfiltered: bool,
+    /// Some with a fit, and some without.
+    pub fitted: bool,
+    pub reflected: bool,
+    /// The most lobes that stand for one where light is looked up.
+    pub most_lobes: u32,
+}
+
 /// What the shaders read.
 pub(crate) struct MaterialImages {
     /// Materials that draws may name: fewer than records, of which lobes have some.
@@ -57,6 +72,8 @@ pub(crate) struct MaterialImages {
     pub maps: MapImages,
     /// Of the lobes and the textures, if the frame predicts bandwidth.
     pub bandwidths: Option<Bandwidths>,
+    /// Of all materials, if light is looked up.
+    pub fits: Option<Buffer>,
 }
 
 /// Created and filled, not yet recorded.
@@ -68,6 +85,17 @@ pub(crate) struct MaterialsUpload {
     density: ImageUpload,
     maps: MapsUpload,
     bandwidths: Option<(ImageUpload, BufferUpload)>,
+    fits: Option<BufferUpload>,
+    pub kinds: Kinds,
+}
+
+/// What materials are prepared for.
+pub(crate) struct Uploading<'a> {
+    /// How maps are read.
+    pub reading: Reading<'a>,
+    /// At which threshold bandwidths are analysed, if the frame predicts it.
+    pub eps: Option<f64>,
+    pub estimator: Estimator,
 }
 
 /// What the prediction of bandwidth knows of the materials.
@@ -186,9 +214,34 @@ fn bandwidths(
     Ok((lobes, BufferUpload::new(build, "texture bandwidth", usage, bytemuck::cast_slice(&cells))?))
 }
 
+/// The fit of a material that one stands for: not where maps, filters or the mesh's curvature change its lobes.
+fn fit(material: &Material, io: &Uploading<'_>, found: bool) -> Option<Arc<LobeFit>> {
+    let Maps { albedo, specular, roughness, .. } = &material.maps;
+    let table = matches!(material.model, Model::Table(_) | Model::Turned(_));
+    let same = table || albedo.is_none() && specular.is_none() && roughness.is_none() && !io.reading.widened && !found;
+    if io.estimator.looks_up() && same { material.lobe_fit.clone() } else { None }
+}
+
+fn kinds(materials: &[Material], found: &[bool], packed: &Packed, filter: Filter) -> Kinds {
+    let layers = filter.lobe_layers() / if filter.has_slopes() { 2 } else { 1 };
+    let own = |(material, found): (&Material, &bool)| match &material.model {
+        _ if *found => layers,
+        Model::Vmf(vmf) => vmf.lobes().len() as u32,
+        _ => 1,
+    };
+    let fitted = |(_, first): &(_, &u32)| **first > 0;
+    let reflected = materials.iter().zip(found).zip(&packed.firsts).filter(|m| !fitted(m)).map(|(m, _)| own(m)).max();
+    Kinds {
+        unfiltered: found.contains(&false),
+        fitted: packed.most > 0,
+        reflected: reflected.is_some(),
+        most_lobes: reflected.unwrap_or_default().max(packed.most as u32),
+    }
+}
+
 impl MaterialsUpload {
-    /// `reading` says how their maps are read, `eps` at which threshold bandwidths are analysed, if the frame predicts it.
-    pub fn new(build: &mut Build<'_>, materials: &[Material], reading: &Reading<'_>, eps: Option<f64>) -> Result<Self> {
+    pub fn new(build: &mut Build<'_>, materials: &[Material], io: &Uploading<'_>) -> Result<Self> {
+        let Uploading { reading, eps, estimator } = io;
         if materials.is_empty() || materials.len() > MAX_MATERIALS {
             return Err(Error::invalid("materials", format!("1 to {MAX_MATERIALS}"), materials.len()));
         }
@@ -209,6 +262,16 @@ impl MaterialsUpload {
         let firsts = ladders.iter().scan(0, |next, ladder| Some(std::mem::replace(next, *next + ladder.steps())));
         let places: Vec<_> = ladders.iter().zip(firsts).map(|(ladder, first)| ladder.record(first)).collect();
         let mut records = records(materials, &tables, &places, size[0]);
+        let maps = MapsUpload::new(build, materials, reading)?;
+        let fits: Vec<_> = materials.iter().zip(&maps.found).map(|(m, found)| fit(m, io, *found)).collect();
+        let fitted = Packed::of(&fits);
+        records.iter_mut().zip(&fitted.firsts).for_each(|(record, first)| record.kind[3] = *first);
+        let kinds = kinds(materials, &maps.found, &fitted, reading.filter);
+        let storage = vk::BufferUsageFlags::STORAGE_BUFFER;
+        let fits = estimator
+            .looks_up()
+            .then(|| BufferUpload::new(build, "lobe fits", storage, bytemuck::cast_slice(&fitted.floats)))
+            .transpose()?;
         let bandwidths = eps.map(|eps| bandwidths(build, materials, &mut records, eps)).transpose()?;
         let importance = atlas::importance_tables(materials, &ladders);
         let image = |name, format, extent| ImageDesc::new(name, format, extent, vk::ImageUsageFlags::SAMPLED);
@@ -219,7 +282,7 @@ impl MaterialsUpload {
         let cast = bytemuck::cast_slice::<u32, u8>;
         Ok(Self {
             count: materials.len() as u32,
-            records: BufferUpload::new(build, "materials", vk::BufferUsageFlags::STORAGE_BUFFER, bytemuck::cast_slice(&records))?,
+            records: BufferUpload::new(build, "materials", storage, bytemuck::cast_slice(&records))?,
             tables: ImageUpload::new(build, image("tables", vk::Format::E5B9G9R9_UFLOAT_PACK32, table_extent), cast(&texels))?,
             importance: ImageUpload::new(
                 build,
@@ -231,8 +294,10 @@ impl MaterialsUpload {
                 image("importance density", vk::Format::R16_SFLOAT, density_extent),
                 bytemuck::cast_slice(&density),
             )?,
-            maps: MapsUpload::new(build, materials, reading)?,
+            maps,
             bandwidths,
+            fits,
+            kinds,
         })
     }
 
@@ -257,6 +322,7 @@ impl MaterialsUpload {
             bandwidths: self
                 .bandwidths
                 .map(|(lobes, textures)| Bandwidths { lobes: lobes.record(rec, bag), textures: textures.record(rec, bag) }),
+            fits: self.fits.map(|fits| fits.record(rec, bag)),
         }
     }
 }
@@ -272,7 +338,7 @@ impl MaterialImages {
         states.forget(self.records.handle);
         self.records.retire(bag);
         let (lobes, textures) = self.bandwidths.map(|b| (b.lobes, b.textures)).unzip();
-        if let Some(buffer) = textures {
+        for buffer in textures.into_iter().chain(self.fits) {
             states.forget(buffer.handle);
             buffer.retire(bag);
         }

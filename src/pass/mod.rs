@@ -10,6 +10,7 @@ pub mod curvature;
 pub mod environment;
 pub mod environment_bandwidth;
 pub mod filter;
+pub(crate) mod fits;
 pub mod gbuffer;
 pub(crate) mod level;
 pub mod luminance;
@@ -21,6 +22,7 @@ pub mod prefilter;
 #[cfg(feature = "offline")]
 pub(crate) mod probe;
 pub mod pyramid;
+pub mod residual_level;
 pub mod resolve;
 pub mod shade;
 pub mod texture_space;
@@ -59,7 +61,7 @@ pub fn interfaces() -> Vec<Interface> {
     let mut all = vec![filter::INTERFACE, curvature::INTERFACE, bandwidth::BLOCKS, bandwidth::INTERFACE, pyramid::INTERFACE];
     all.extend(classify::INTERFACES);
     all.extend(allocate::INTERFACES);
-    all.extend([base::INTERFACE, shade::INTERFACE, upsample::INTERFACE, resolve::INTERFACE]);
+    all.extend([residual_level::INTERFACE, base::INTERFACE, shade::INTERFACE, upsample::INTERFACE, resolve::INTERFACE]);
     all.extend(tonemap::INTERFACES);
     all.extend(environment_bandwidth::INTERFACES);
     all.extend(luminance::INTERFACES);

@@ -30,6 +30,7 @@ modules! {
     "pyramid.comp",
     "classify.comp",
     "classify.levels.comp",
+    "residual_level.comp",
     "base.comp",
     "allocate_count.comp",
     "allocate_share.comp",

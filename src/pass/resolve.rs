@@ -1,5 +1,6 @@
 //! Pass 9: averages the shading samples of each output pixel; the background is black or the environment.
 
+use crate::config::{Config, Estimator};
 use crate::error::Result;
 use crate::gpu::access::Access;
 use crate::gpu::buffer::Buffer;
@@ -19,10 +20,17 @@ pub const NAME: &str = "resolve";
 pub const INTERFACE: Interface = Interface {
     name: NAME,
     local_size: [8, 8, 1],
-    push_bytes: 0,
+    push_bytes: size_of::<f32>() as u32,
     gbuffer: true,
     materials: false,
-    own: &[D::UNIFORM_BUFFER, D::COMBINED_IMAGE_SAMPLER, D::COMBINED_IMAGE_SAMPLER, D::COMBINED_IMAGE_SAMPLER, D::STORAGE_IMAGE],
+    own: &[
+        D::UNIFORM_BUFFER,
+        D::COMBINED_IMAGE_SAMPLER,
+        D::COMBINED_IMAGE_SAMPLER,
+        D::COMBINED_IMAGE_SAMPLER,
+        D::STORAGE_IMAGE,
+        D::COMBINED_IMAGE_SAMPLER,
+    ],
 };
 
 pub(crate) struct Io<'a> {
@@ -31,6 +39,8 @@ pub(crate) struct Io<'a> {
     pub samplers: &'a Samplers,
     pub environment: &'a EnvironmentImages,
     pub radiance: &'a Image,
+    /// What `radiance` is missing or a factor on, and the radiance on both sides of a factor.
+    pub base: Option<(&'a Image, f32)>,
     /// Out: linear radiance; alpha is coverage.
     pub resolved: &'a Image,
 }
@@ -38,14 +48,18 @@ pub(crate) struct Io<'a> {
 pub(crate) struct Resolve(ComputePipeline);
 
 impl Resolve {
-    pub fn new(p: &mut PassContext<'_, '_>) -> Result<Self> {
-        Ok(Self(ComputePipeline::new(p.build, p.modules, &INTERFACE, p.bridge, p.slots, &[])?))
+    pub fn new(p: &mut PassContext<'_, '_>, config: &Config) -> Result<Self> {
+        let residual = [config.estimator.has_residual(), config.estimator == Estimator::Residual].map(u32::from);
+        Ok(Self(ComputePipeline::new(p.build, p.modules, &INTERFACE, p.bridge, p.slots, &residual)?))
     }
 
     pub fn record(&self, rec: &mut Recorder<'_>, io: &Io<'_>) {
         rec.begin(NAME);
         io.environment.sampled(rec);
         rec.image(io.radiance, Access::COMPUTE_SAMPLED);
+        if let Some((base, _)) = io.base {
+            rec.image(base, Access::COMPUTE_SAMPLED);
+        }
         rec.overwrite(io.resolved, Access::COMPUTE_WRITE);
         rec.flush();
         let resources = [
@@ -54,8 +68,9 @@ impl Resolve {
             Resource::Sampled(&io.environment.alias, io.samplers.nearest),
             Resource::Sampled(io.radiance, io.samplers.nearest),
             Resource::Storage(io.resolved.view),
+            Resource::Sampled(io.base.map_or(io.radiance, |b| b.0), io.samplers.nearest),
         ];
-        self.0.bind(rec, io.bridge, &resources, &());
+        self.0.bind(rec, io.bridge, &resources, &io.base.map_or(0.0, |b| b.1));
         self.0.dispatch(rec, io.resolved.extent());
         rec.end();
     }

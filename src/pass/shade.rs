@@ -13,7 +13,7 @@ use crate::gpu::retire::Retired;
 use crate::gpu::sampler::Samplers;
 use crate::pass::PassContext;
 use crate::pass::environment::EnvironmentImages;
-use crate::pass::materials::MaterialImages;
+use crate::pass::materials::{Kinds, MaterialImages};
 use crate::plan::Directions;
 use ash::vk::DescriptorType as D;
 use bytemuck::{Pod, Zeroable};
@@ -40,6 +40,9 @@ pub const INTERFACE: Interface = Interface {
         D::COMBINED_IMAGE_SAMPLER,
         D::COMBINED_IMAGE_SAMPLER,
         D::COMBINED_IMAGE_SAMPLER,
+        D::STORAGE_BUFFER,
+        D::COMBINED_IMAGE_SAMPLER,
+        D::STORAGE_BUFFER,
     ],
 };
 
@@ -50,6 +53,8 @@ struct Push {
     brdf_samples: u32,
     environment_samples: u32,
     light_samples: u32,
+    offset: f32,
+    negligible: f32,
 }
 
 pub(crate) struct Io<'a> {
@@ -69,46 +74,68 @@ pub(crate) struct Io<'a> {
     pub lights: &'a Buffer,
     pub light_count: u32,
     pub directions: Directions,
+    pub residual: Option<Residual<'a>>,
     /// Out: linear radiance where listed.
     pub radiance: &'a Image,
     /// Out, where samples stand for cells: that of odd levels.
     pub odd: Option<&'a Image>,
 }
 
-/// One pipeline for frames without lights beside the environment, one for frames with.
-pub(crate) struct Shade {
-    /// For materials of which the filter finds all lobes.
-    all: Option<[ComputePipeline; 2]>,
-    others: [ComputePipeline; 2],
+/// What a residual is found against.
+#[derive(Clone, Copy)]
+pub(crate) struct Residual<'a> {
+    /// Of the `base` pass.
+    pub base: &'a Image,
+    pub fits: &'a Buffer,
+    /// Of the pre-convolved light.
+    pub suns: &'a Buffer,
+    /// On both sides of a factor on it, in radiance.
+    pub offset: f32,
 }
 
-/// Constants of `glsl/include/lobes.glsl`, and whether there are materials whose lobes the filter does not find.
-pub(crate) fn lobe_constants(config: &Config, unfiltered: bool) -> [u32; 5] {
+/// One pipeline for frames without lights beside the environment, one for frames with.
+pub(crate) struct Shade {
+    pipelines: [ComputePipeline; 2],
+    /// Error of a fit up to which nothing is estimated.
+    negligible: f32,
+}
+
+/// Constants of `glsl/include/lobes.glsl` and `approximation.glsl`, and whether there are materials whose lobes the filter does not
+/// find.
+pub(crate) fn lobe_constants(config: &Config, kinds: Kinds) -> [u32; 7] {
     let layers = config.filter.lobe_layers();
     let slopes = config.filter.has_slopes();
     let smith = config.filter == Filter::Leadr;
-    [layers.max(1), u32::from(layers > 0), u32::from(slopes), u32::from(smith), u32::from(unfiltered)]
+    let of_kinds = [kinds.unfiltered, kinds.fitted, kinds.reflected].map(u32::from);
+    let [unfiltered, fitted, reflected] = of_kinds;
+    [layers.max(1), u32::from(layers > 0), u32::from(slopes), u32::from(smith), unfiltered, fitted, reflected]
 }
 
 impl Shade {
     /// `levelled` says whether entries of the list stand for cells of levels.
-    pub fn new(p: &mut PassContext<'_, '_>, config: &Config, levelled: bool) -> Result<Self> {
+    pub fn new(p: &mut PassContext<'_, '_>, config: &Config, levelled: bool, kinds: Kinds) -> Result<Self> {
         let constant = match config.estimator {
             Estimator::Mis | Estimator::Preconvolved => 0,
             Estimator::Brdf => 1,
             Estimator::BrdfRandom => 2,
             Estimator::Lookup => 3,
+            Estimator::Cv | Estimator::Residual => 4,
         };
-        let mut make = |lights, unfiltered| {
+        let ratio = config.estimator == Estimator::Residual;
+        let mut make = |lights| {
             let allocated = u32::from(config.allocation != Allocation::Constant);
             let (levelled, widened) = (u32::from(levelled), u32::from(config.widened()));
             let own = [constant, lights, levelled, widened, config.sharing_levels(), allocated];
-            let constants: Vec<_> = own.into_iter().chain(lobe_constants(config, unfiltered)).collect();
+            let constants: Vec<_> = own
+                .into_iter()
+                .chain(lobe_constants(config, kinds))
+                .chain([kinds.most_lobes, u32::from(ratio), u32::from(config.exact_lobes)])
+                .collect();
             ComputePipeline::new(p.build, p.modules, &INTERFACE, p.bridge, p.slots, &constants)
         };
-        let mut both = |unfiltered| -> Result<_> { Ok([make(0, unfiltered)?, make(1, unfiltered)?]) };
-        let others = both(true)?;
-        Ok(Self { others, all: if config.filter.lobe_layers() > 0 { Some(both(false)?) } else { None } })
+        // Unbiased with all of it.
+        let negligible = if ratio { config.residual_errors[0] } else { -1.0 };
+        Ok(Self { pipelines: [make(0)?, make(1)?], negligible })
     }
 
     pub fn record(&self, rec: &mut Recorder<'_>, io: &Io<'_>) {
@@ -122,13 +149,17 @@ impl Shade {
         rec.buffer(io.arguments, Access::COMPUTE_READ);
         rec.buffer(io.list, Access::COMPUTE_READ);
         rec.overwrite(io.radiance, Access::COMPUTE_WRITE);
+        if let Some(Residual { base, fits, suns, .. }) = io.residual {
+            rec.image(base, Access::COMPUTE_SAMPLED);
+            [fits, suns].into_iter().for_each(|buffer| rec.buffer(buffer, Access::COMPUTE_READ));
+        }
         if let Some(odd) = io.odd {
             rec.overwrite(odd, Access::COMPUTE_WRITE);
         }
         rec.flush();
         let resources = [
             Resource::Uniform(io.frame),
-            Resource::Sampled(&io.environment.map, io.samplers.linear),
+            Resource::Sampled(io.environment.drawn(), io.samplers.linear),
             Resource::Sampled(&io.environment.alias, io.samplers.nearest),
             Resource::Buffer(io.arguments),
             Resource::Buffer(io.list),
@@ -138,17 +169,27 @@ impl Shade {
             Resource::Sampled(io.normals, io.samplers.nearest),
             Resource::Sampled(io.factors, io.samplers.nearest),
             Resource::Sampled(io.lobes, io.samplers.nearest),
+            // Bound to something where there are none.
+            Resource::Buffer(io.residual.map_or(io.lights, |r| r.fits)),
+            Resource::Sampled(io.residual.map_or(io.normals, |r| r.base), io.samplers.nearest),
+            Resource::Buffer(io.residual.map_or(io.lights, |r| r.suns)),
         ];
         let Directions { brdf, environment, light } = io.directions;
-        let push = Push { brdf_samples: brdf, environment_samples: environment, light_samples: light };
-        let pipelines = self.all.as_ref().filter(|_| !io.materials.maps.unfiltered).unwrap_or(&self.others);
-        let pipeline = &pipelines[usize::from(io.light_count > 0)];
+        let offset = io.residual.map_or(0.0, |r| r.offset);
+        let push = Push {
+            brdf_samples: brdf,
+            environment_samples: environment,
+            light_samples: light,
+            offset,
+            negligible: self.negligible,
+        };
+        let pipeline = &self.pipelines[usize::from(io.light_count > 0)];
         pipeline.bind(rec, io.bridge, &resources, &push);
         pipeline.dispatch_indirect(rec, io.arguments, 0);
         rec.end();
     }
 
     pub fn retire(self, bag: &mut Retired) {
-        self.all.into_iter().chain([self.others]).flatten().for_each(|p| p.retire(bag));
+        self.pipelines.into_iter().for_each(|p| p.retire(bag));
     }
 }

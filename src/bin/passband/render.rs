@@ -205,9 +205,8 @@ impl Args {
             Method::Brdf => Estimator::Brdf,
             Method::BrdfRandom => Estimator::BrdfRandom,
             Method::Preconvolved => Estimator::Preconvolved,
-            Method::Cv | Method::Residual => {
-                return Err(Error::NotSupportedYet { what: "--estimator cv and residual".into() });
-            }
+            Method::Cv => Estimator::Cv,
+            Method::Residual => Estimator::Residual,
         };
         let supersample = self.filter == "supersample";
         if !FILTERS.contains(&self.filter.as_str()) && !supersample {

@@ -86,7 +86,7 @@ fn replace(headless: &mut Headless, cx: &Context, made: &mut Made, map: &LatLong
     for round in 0..=WARM_UP + rounds {
         headless.submit(|cmd, memory| {
             let Made { timer, samplers, pass } = made;
-            let analyses = Analyses { bandwidth: Some(pass), prefilter: None };
+            let analyses = Analyses { bandwidth: Some(pass), prefilter: None, rest: false };
             let known = timer.begin_frame(cx, cmd, 0)?;
             timings.extend(known.filter(|_| round > WARM_UP));
             let clock = Instant::now();

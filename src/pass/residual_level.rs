@@ -1,0 +1,83 @@
+//! Pass 4 of residuals: the level of each sample by the error of its material's fit as the viewer sees it
+//! ([`crate::distribution::fit`]).
+
+use crate::config::Config;
+use crate::error::Result;
+use crate::gpu::access::Access;
+use crate::gpu::buffer::Buffer;
+use crate::gpu::image::Image;
+use crate::gpu::pipeline::{BridgeSets, ComputePipeline, Interface, Resource};
+use crate::gpu::recorder::Recorder;
+use crate::gpu::retire::Retired;
+use crate::gpu::sampler::Samplers;
+use crate::pass::PassContext;
+use crate::pass::materials::MaterialImages;
+use ash::vk::DescriptorType as D;
+use bytemuck::{Pod, Zeroable};
+
+/// Pass, shader, label and timer name.
+pub const NAME: &str = "residual_level";
+
+/// Shader interface.
+pub const INTERFACE: Interface = Interface {
+    name: NAME,
+    local_size: [8, 8, 1],
+    push_bytes: size_of::<Push>() as u32,
+    gbuffer: true,
+    materials: true,
+    own: &[D::UNIFORM_BUFFER, D::COMBINED_IMAGE_SAMPLER, D::STORAGE_BUFFER, D::STORAGE_IMAGE],
+};
+
+#[repr(C)]
+#[derive(Clone, Copy, Pod, Zeroable)]
+struct Push {
+    errors: [f32; 2],
+    coarsest: u32,
+    half_rate: u32,
+    finest: u32,
+}
+
+pub(crate) struct Io<'a> {
+    pub frame: &'a Buffer,
+    pub bridge: BridgeSets,
+    pub samplers: &'a Samplers,
+    /// Of the `filter` pass.
+    pub normals: &'a Image,
+    pub materials: &'a MaterialImages,
+    pub fits: &'a Buffer,
+    /// Out: the level of each sample, in levels over a sample.
+    pub level: &'a Image,
+}
+
+pub(crate) struct ResidualLevel(ComputePipeline, Push);
+
+impl ResidualLevel {
+    pub fn new(p: &mut PassContext<'_, '_>, config: &Config) -> Result<Self> {
+        let ([_, coarse, half], above) = (config.residual_errors, config.samples_per_side.ilog2());
+        let coarsest = config.coarsest();
+        let push = Push { errors: [coarse, half], coarsest, half_rate: coarsest.min(above + 1), finest: coarsest.min(above) };
+        Ok(Self(ComputePipeline::new(p.build, p.modules, &INTERFACE, p.bridge, p.slots, &[])?, push))
+    }
+
+    pub fn record(&self, rec: &mut Recorder<'_>, io: &Io<'_>) {
+        rec.begin(NAME);
+        io.materials.sampled(rec);
+        rec.image(io.normals, Access::COMPUTE_SAMPLED);
+        rec.buffer(io.fits, Access::COMPUTE_READ);
+        rec.overwrite(io.level, Access::COMPUTE_WRITE);
+        rec.flush();
+        let resources = [
+            Resource::Uniform(io.frame),
+            Resource::Sampled(io.normals, io.samplers.nearest),
+            Resource::Buffer(io.fits),
+            Resource::Storage(io.level.view),
+        ];
+        self.0.bind(rec, io.bridge, &resources, &self.1);
+        self.0.dispatch(rec, io.level.extent());
+        rec.end();
+    }
+
+    pub fn retire(self, bag: &mut Retired) {
+        self.0.retire(bag);
+    }
+}
