@@ -80,6 +80,11 @@ impl LobeFit {
         (nodes.len() == NODES && count <= MOST_LOBES && nodes.iter().all(valid)).then_some(Self { nodes })
     }
 
+    /// Of [`NODES`] valid nodes.
+    pub(super) fn of(nodes: Vec<FitNode>) -> Self {
+        Self { nodes }
+    }
+
     /// Nodes by ascending view angle.
     pub fn nodes(&self) -> &[FitNode] {
         &self.nodes

@@ -27,6 +27,7 @@ pub use brdf_map::BrdfMap;
 pub use filter::{Division, Filter, MOST_BASE_LOBES};
 pub use filtered::Filtered;
 pub use fit::LobeFit;
+pub use fitter::Budget;
 pub use mixture::Mixture;
 pub use partition::Cells;
 pub use surface::Surface;

@@ -26,6 +26,12 @@ impl HalfRow<'_> {
         let [sine, cosine] = self.polar;
         DVec3::new(sine * self.azimuths[0][i], sine * self.azimuths[1][i], cosine)
     }
+
+    /// The first `count` columns, which are as many.
+    pub(super) fn first(&self, count: usize) -> HalfRow<'_> {
+        let azimuths = self.azimuths.map(|a| &a[..count]);
+        HalfRow { azimuths, cosines: &self.cosines[..count], lights: &self.lights[..count], ..*self }
+    }
 }
 
 /// Writes a row's values: `weights . mean_over_turns` for each of its half vectors.

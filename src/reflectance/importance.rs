@@ -5,8 +5,14 @@
 //! `t = 1 - cos(theta_h)` in [0, 1] and its azimuth in [-pi, pi], in which solid angle is `dt dphi`. The tables follow the
 //! reflectance's mean over turns about the normal, which is the reflectance itself if it is isotropic; so the azimuth's sign
 //! is a coin toss and they cover [0, pi].
+//!
+//! A table follows the reflectance, or what a fit by lobes leaves of it. That is drawn over the sphere, as a fit leaks below
+//! the horizon, but for directions that no half vector above it reflects to: those with `wi.z < -wo.z`.
 
+use crate::distribution::LobeFit;
+use crate::distribution::fit::FitNode;
 use crate::reflectance::half_row::{HalfRow, Rows};
+use crate::reflectance::residual::Residual;
 use crate::reflectance::{Reflectance, clamped};
 use crate::sampling::LUMINANCE;
 use glam::DVec3;
@@ -33,6 +39,8 @@ const FINE_ROWS: usize = 512;
 const FINE_COLUMNS: usize = 64;
 /// Share of the density that follows the reflectance; the rest follows the cosine, for what the table does not foresee.
 const REFLECTANCE_SHARE: f64 = 0.9;
+/// The same of a table for what a fit leaves.
+const RESIDUAL_SHARE: f64 = 0.85;
 /// Uniform density added everywhere, so that no cell is empty. It amounts to one row: with less, the last row would stretch
 /// over all that is below the horizon and take part of the lobe with it (measured: up to twice the deviation of broad lobes).
 const FLOOR: f64 = 1.0 / (2.0 * PI * ROWS as f64);
@@ -55,7 +63,7 @@ pub struct ImportanceTable {
 /// A direction drawn from an [`ImportanceTable`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ImportanceSample {
-    /// To the light (unit, above the horizon).
+    /// To the light (unit).
     pub wi: DVec3,
     /// The half vector.
     pub h: DVec3,
@@ -67,16 +75,41 @@ impl ImportanceTable {
     /// Tabulates `reflectance`. Each node's target is the average of those at both ends of its range of view angles, so that
     /// directions which are above the horizon for some pixel of the node are never left to the floor.
     pub fn build(reflectance: &dyn Reflectance) -> Self {
-        let mut table = Self { cells: Vec::new(), density: Vec::new() };
         let grid = FineGrid::new();
         let rows = reflectance.rows(LUMINANCE);
-        let mut before = grid.target(&rows, 1.0);
+        Self::of(&grid, |cos_o| grid.target(grid.reflected(&rows, cos_o), REFLECTANCE_SHARE, cos_o))
+    }
+
+    /// Tabulates the mean over channels of `|f - a|` over the sphere, f the `reflectance` times the cosine and a its `fit`: for
+    /// estimates of what the fit leaves. What turns about the normal change is missing in their mean: as much as the fit's
+    /// errors say of it is taken to be where the reflectance is.
+    pub fn build_residual(reflectance: &dyn Reflectance, fit: &LobeFit) -> Self {
+        let grid = FineGrid::new();
+        let residual = Residual::of(reflectance);
+        let turns = !reflectance.isotropic();
+        let target = |cos_o: f64| {
+            let node = fit.at(cos_o);
+            let [mut left, all] = grid.residual(&residual, &node, cos_o);
+            let total = grid.integral(&all);
+            let unseen = node.error - grid.integral(&left) / total;
+            if turns && unseen > 0.0 {
+                left.iter_mut().zip(all).for_each(|(left, all)| *left += unseen * all);
+            }
+            grid.target(left, RESIDUAL_SHARE, cos_o)
+        };
+        Self::of(&grid, target)
+    }
+
+    /// From the target under each view cosine.
+    fn of(grid: &FineGrid, target: impl Fn(f64) -> Vec<f64>) -> Self {
+        let mut table = Self { cells: Vec::new(), density: Vec::new() };
+        let mut before = target(1.0);
         for node in 0..VIEW_ANGLES {
             let theta = FRAC_PI_2 * (node + 1) as f64 / VIEW_ANGLES as f64;
-            let after = grid.target(&rows, theta.cos().max(GRAZING));
-            let target: Vec<f64> = before.iter().zip(&after).map(|(a, b)| (a + b) / 2.0).collect();
-            grid.cut(&target, &mut table.cells);
-            grid.resample(&target, &mut table.density);
+            let after = target(theta.cos().max(GRAZING));
+            let mean: Vec<f64> = before.iter().zip(&after).map(|(a, b)| (a + b) / 2.0).collect();
+            grid.cut(&mean, &mut table.cells);
+            grid.resample(&mean, &mut table.density);
             before = after;
         }
         table
@@ -107,11 +140,16 @@ impl ImportanceTable {
     /// Draws a light direction for the view cosine `cos_o` from two numbers in [0, 1). `None` is a rejected sample, below
     /// the horizon or seen from behind: it counts as zero in an estimate, not as not drawn.
     pub fn sample(&self, cos_o: f64, u: [f64; 2]) -> Option<ImportanceSample> {
+        self.sample_sphere(cos_o, u).filter(|sample| sample.wi.z > 0.0)
+    }
+
+    /// The same, but for directions below the horizon, which count here.
+    pub fn sample_sphere(&self, cos_o: f64, u: [f64; 2]) -> Option<ImportanceSample> {
         let (h, pdf_h) = self.half_vector(cos_o, u);
         let wo = viewer(cos_o);
         let cosine = wo.dot(h);
         let wi = 2.0 * cosine * h - wo;
-        (cosine > 0.0 && wi.z > 0.0).then(|| ImportanceSample { wi, h, pdf: pdf_h / (4.0 * cosine) })
+        (cosine > 0.0).then(|| ImportanceSample { wi, h, pdf: pdf_h / (4.0 * cosine) })
     }
 
     /// The exact density per steradian with which [`Self::half_vector`] draws unit `h`; 0 below the horizon.
@@ -129,10 +167,15 @@ impl ImportanceTable {
 
     /// The exact density per steradian with which [`Self::sample`] draws unit `wi`; 0 below the horizon.
     pub fn pdf(&self, cos_o: f64, wi: DVec3) -> f64 {
+        if wi.z > 0.0 { self.pdf_sphere(cos_o, wi) } else { 0.0 }
+    }
+
+    /// The exact density per steradian with which [`Self::sample_sphere`] draws unit `wi`.
+    pub fn pdf_sphere(&self, cos_o: f64, wi: DVec3) -> f64 {
         let wo = viewer(cos_o);
         let h = (wi + wo).normalize_or_zero();
         let cosine = wo.dot(h);
-        if wi.z > 0.0 && cosine > 0.0 { self.pdf_half(cos_o, h) / (4.0 * cosine) } else { 0.0 }
+        if cosine > 0.0 { self.pdf_half(cos_o, h) / (4.0 * cosine) } else { 0.0 }
     }
 
     /// A smooth stand-in for the density of `h` per steradian, bilinear in its table: **for the weights of multiple
@@ -223,34 +266,67 @@ impl FineGrid {
         (self.t[row + 1] - self.t[row]) * PI / FINE_COLUMNS as f64
     }
 
-    /// The density of half vectors to aim for, per steradian: the reflected luminance, a cosine lobe and the floor. The first
-    /// two are densities of the light's direction times 4 (o.h), which takes them to half vectors (Walter et al. 2007, equation 14).
-    fn target(&self, rows: &Rows<'_>, cos_o: f64) -> Vec<f64> {
+    /// Calls `each` for the rows of which something is seen, those columns: the first ones, as the cosines fall with the azimuth.
+    /// With the place of the row in a table of values and the number of columns whose light comes from above the horizon.
+    fn each_row(&self, cos_o: f64, mut each: impl FnMut(usize, &HalfRow<'_>, usize)) {
         let wo = viewer(cos_o);
-        let mut reflected = vec![0.0; FINE_ROWS * FINE_COLUMNS];
-        let mut defensive = reflected.clone();
-        let lines = reflected.as_chunks_mut::<FINE_COLUMNS>().0.iter_mut().zip(defensive.as_chunks_mut::<FINE_COLUMNS>().0);
-        for (&polar @ [sine, cosine], (reflected, defensive)) in self.polar.iter().zip(lines) {
+        for (row, &polar @ [sine, cosine]) in self.polar.iter().enumerate() {
             let cosines: [f64; FINE_COLUMNS] = self.azimuths[0].map(|x| wo.x * sine * x + wo.z * cosine);
             let lights = cosines.map(|c| 2.0 * c * cosine - wo.z);
-            // Both fall with the azimuth: light comes from above the horizon in the first columns.
-            let lit = cosines.iter().zip(&lights).take_while(|(c, light)| **c > 0.0 && **light > 0.0).count();
-            if lit == 0 {
-                continue;
-            }
-            let [cosines, lights] = [&cosines[..lit], &lights[..lit]];
-            let azimuths = self.azimuths.each_ref().map(|a| &a[..lit]);
-            rows(&HalfRow { wo, polar, azimuths, cosines, lights }, &mut reflected[..lit]);
-            for (((f, d), c), light) in reflected.iter_mut().zip(defensive).zip(cosines).zip(lights) {
-                let jacobian = 4.0 * c * light;
-                let value = *f * jacobian;
-                *f = if value > 0.0 && value < f64::INFINITY { value } else { 0.0 };
-                *d = (1.0 - REFLECTANCE_SHARE) / PI * jacobian;
+            let seen = cosines.iter().take_while(|c| **c > 0.0).count();
+            let lit = lights[..seen].iter().take_while(|light| **light > 0.0).count();
+            if seen > 0 {
+                let azimuths = self.azimuths.each_ref().map(|a| &a[..seen]);
+                let row_of = HalfRow { wo, polar, azimuths, cosines: &cosines[..seen], lights: &lights[..seen] };
+                each(row * FINE_COLUMNS, &row_of, lit);
             }
         }
-        let integral = self.integral(&reflected);
-        let scale = if integral.is_normal() { REFLECTANCE_SHARE / integral } else { 0.0 };
-        let mut target = reflected;
+    }
+
+    /// The reflected luminance, as a density of half vectors: that of the light's direction times 4 (o.h) (Walter et al. 2007,
+    /// equation 14).
+    fn reflected(&self, rows: &Rows<'_>, cos_o: f64) -> Vec<f64> {
+        let mut reflected = vec![0.0; FINE_ROWS * FINE_COLUMNS];
+        self.each_row(cos_o, |at, row, lit| {
+            if lit == 0 {
+                return;
+            }
+            let (row, values) = (row.first(lit), &mut reflected[at..at + lit]);
+            rows(&row, values);
+            for ((f, c), light) in values.iter_mut().zip(row.cosines).zip(row.lights) {
+                let value = *f * (4.0 * c * light);
+                *f = if value > 0.0 && value < f64::INFINITY { value } else { 0.0 };
+            }
+        });
+        reflected
+    }
+
+    /// What a fit leaves of a reflectance, and all of it, in the same way.
+    fn residual(&self, residual: &Residual<'_>, fit: &FitNode, cos_o: f64) -> [Vec<f64>; 2] {
+        let mut values = [vec![0.0; FINE_ROWS * FINE_COLUMNS], vec![0.0; FINE_ROWS * FINE_COLUMNS]];
+        let mut of_row = [[0.0; FINE_COLUMNS]; 2];
+        self.each_row(cos_o, |at, row, lit| {
+            residual.row(fit, row, lit, of_row.each_mut());
+            for (values, of_row) in values.iter_mut().zip(&of_row) {
+                let columns = values[at..at + row.cosines.len()].iter_mut().zip(of_row).zip(row.cosines);
+                columns.for_each(|((value, f), c)| *value = 4.0 * c * f);
+            }
+        });
+        values
+    }
+
+    /// The density of half vectors to aim for, per steradian: `share` of it as `wanted`, the rest a cosine lobe of light, and the
+    /// floor.
+    fn target(&self, wanted: Vec<f64>, share: f64, cos_o: f64) -> Vec<f64> {
+        let mut defensive = vec![0.0; FINE_ROWS * FINE_COLUMNS];
+        self.each_row(cos_o, |at, row, lit| {
+            for ((d, c), light) in defensive[at..at + lit].iter_mut().zip(row.cosines).zip(row.lights) {
+                *d = (1.0 - share) / PI * (4.0 * c * light);
+            }
+        });
+        let integral = self.integral(&wanted);
+        let scale = if integral.is_normal() { share / integral } else { 0.0 };
+        let mut target = wanted;
         target.iter_mut().zip(defensive).for_each(|(f, d)| *f = *f * scale + d + FLOOR);
         let integral = self.integral(&target);
         target.iter_mut().for_each(|f| *f /= integral);

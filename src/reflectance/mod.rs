@@ -20,6 +20,7 @@ pub mod importance;
 pub(crate) mod ladder;
 pub mod merl;
 pub mod packing;
+mod residual;
 pub mod rgl;
 pub mod sgd;
 #[cfg(feature = "offline")]
