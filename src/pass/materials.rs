@@ -216,9 +216,8 @@ fn bandwidths(
 
 /// The fit of a material that one stands for: not where maps, filters or the mesh's curvature change its lobes.
 fn fit(material: &Material, io: &Uploading<'_>, found: bool) -> Option<Arc<LobeFit>> {
-    let Maps { albedo, specular, roughness, .. } = &material.maps;
     let table = matches!(material.model, Model::Table(_) | Model::Turned(_));
-    let same = table || albedo.is_none() && specular.is_none() && roughness.is_none() && !io.reading.widened && !found;
+    let same = table || material.keeps_model() && !io.reading.widened && !found;
     if io.estimator.looks_up() && same { material.lobe_fit.clone() } else { None }
 }
 
