@@ -1,6 +1,7 @@
 //! What a renderer is built for. Everything here is fixed until [`crate::Renderer::resize`] or a new renderer.
 
 use crate::distribution::fit::MOST_LOBES;
+use crate::distribution::fitter::Budget;
 use crate::distribution::{Division, Filter};
 use crate::error::{Error, Result};
 use crate::frequency::allocation::Allocation;
@@ -224,6 +225,11 @@ impl Config {
             gbuffer: GBufferSource::default(),
             modules: Modules::default(),
         }
+    }
+
+    /// Of fits of materials.
+    pub(crate) fn fit_budget(&self) -> Budget {
+        Budget { lobes: self.fit_lobes as usize, ..Budget::default() }
     }
 
     /// Whether levels follow from the predicted bandwidth of the image.

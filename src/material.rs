@@ -119,6 +119,13 @@ impl Material {
         Self { model, maps, lobe_bandwidth: None, lobe_fit: None }
     }
 
+    /// Whether its maps leave the model as it is, but for a factor and the normal: whether [`Self::lobe_fit`] can stand for it.
+    pub(crate) fn keeps_model(&self) -> bool {
+        let Maps { albedo, specular, roughness, .. } = &self.maps;
+        let table = matches!(self.model, Model::Table(_) | Model::Turned(_));
+        table || albedo.is_none() && specular.is_none() && roughness.is_none()
+    }
+
     /// Refuses parameters and maps that the model does not take.
     ///
     /// # Errors

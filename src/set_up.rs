@@ -2,7 +2,6 @@
 
 use crate::config::Bins;
 use crate::distribution::effective::Rule;
-use crate::distribution::fitter::Budget;
 use crate::error::{Error, Result};
 use crate::gpu::memory::HostAllocator;
 use crate::gpu::pipeline::BridgeLayouts;
@@ -73,7 +72,7 @@ impl Renderer {
         let (filter, bins) = (self.config.filter, self.config.bins);
         let (passes, samplers) = (self.passes.moments.as_ref(), &self.samplers);
         let (eps, estimator) = (config.predicts().then_some(config.eps), config.estimator);
-        let budget = Budget { lobes: config.fit_lobes as usize, ..Budget::default() };
+        let budget = config.fit_budget();
         let kept = self.materials.as_ref().map(|m| m.of_kinds.kinds);
         let (mut upload, filter, of_kinds) = Build::run(&self.cx, memory, |build| {
             let reading = Reading { filter, bins, rule, widened, passes, samplers };

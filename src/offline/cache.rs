@@ -21,6 +21,23 @@ pub(crate) fn read(entry: &Path) -> Option<Vec<u8>> {
     (Sha256::digest(&content).as_slice() == bytes).then_some(content)
 }
 
+/// What `entry` holds if it is whole and `from` can read it; otherwise what `make` makes, which is kept there if that is possible.
+pub(crate) fn kept<T>(
+    entry: Option<&Path>,
+    from: impl FnOnce(&[u8]) -> Option<T>,
+    to: impl FnOnce(&T) -> Vec<u8>,
+    make: impl FnOnce() -> T,
+) -> T {
+    if let Some(known) = entry.and_then(|entry| from(&read(entry)?)) {
+        return known;
+    }
+    let made = make();
+    if let Some(entry) = entry {
+        keep(entry, &to(&made));
+    }
+    made
+}
+
 /// Writes an entry if that is possible.
 pub(crate) fn keep(entry: &Path, content: &[u8]) {
     let Some(folder) = entry.parent() else { return };

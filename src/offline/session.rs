@@ -13,13 +13,13 @@ use crate::gpu::timer::FrameTimings;
 use crate::gpu::upload::{BufferUpload, ImageUpload};
 use crate::offline::error::{Error, Result};
 use crate::offline::headless::Headless;
-use crate::offline::lobe_cache;
 use crate::offline::mesh_buffers::MeshBuffers;
 pub use crate::offline::read_back::MomentLevels;
 use crate::offline::read_back::copy_buffer;
 use crate::offline::shown::Shown;
 use crate::offline::window::{Window, near};
 use crate::offline::world::World;
+use crate::offline::{fit_cache, lobe_cache};
 use crate::pass::PassContext;
 use crate::pass::probe::Probe;
 use crate::plan::Levels;
@@ -72,6 +72,13 @@ impl Session {
                 m.lobe_bandwidth = Some(Arc::new(lobe_cache::lobe_bandwidth(&m.model, config.eps, folder.as_deref())));
             };
             materials.iter_mut().for_each(analyse);
+        }
+        if config.estimator.looks_up() {
+            let folder = fit_cache::cache_folder();
+            let fit = |m: &mut crate::Material| {
+                m.lobe_fit = Some(Arc::new(fit_cache::lobe_fit(&m.model, config.fit_budget(), folder.as_deref())));
+            };
+            materials.iter_mut().filter(|m| m.keeps_model()).for_each(fit);
         }
         // SAFETY: the command buffer is recording and submitted at once.
         headless.submit(|cmd, memory| Ok(unsafe { renderer.record_materials(cmd, &materials, memory) }?))?;

@@ -12,7 +12,7 @@ use crate::gpu::recorder::{Recorder, States};
 use crate::gpu::retire::{Build, Handle, Retired};
 use crate::gpu::sampler::Samplers;
 use crate::gpu::upload::{BufferUpload, ImageUpload};
-use crate::material::{MOST_KERNEL, Maps, Material};
+use crate::material::{MOST_KERNEL, Material};
 use crate::pass::fits::Packed;
 use crate::pass::maps::{MapImages, MapsUpload, Reading, Uses};
 use crate::pass::{brdf_map, vmf_mips};
@@ -219,9 +219,8 @@ fn bandwidths(
 
 /// The fit of a material that one stands for: not where maps, filters or the mesh's curvature change its lobes.
 fn fit(material: &Material, io: &Uploading<'_>, found: bool) -> Option<Arc<LobeFit>> {
-    let Maps { albedo, specular, roughness, .. } = &material.maps;
     let table = matches!(material.model, Model::Table(_) | Model::Turned(_));
-    let same = table || albedo.is_none() && specular.is_none() && roughness.is_none() && !io.reading.widened && !found;
+    let same = table || material.keeps_model() && !io.reading.widened && !found;
     let build = || Arc::new(LobeFit::build(&material.model, io.budget));
     (io.estimator.looks_up() && same).then(|| material.lobe_fit.clone().unwrap_or_else(build))
 }

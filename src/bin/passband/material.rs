@@ -2,8 +2,10 @@
 
 use comfy_table::{Table, presets};
 use glam::DVec3;
+use passband::distribution::{Budget, LobeFit};
 use passband::frequency::environment::EPS;
 use passband::offline::error::{Error, Result};
+use passband::offline::fit_cache::{self, lobe_fit};
 use passband::offline::lobe_cache::{self, lobe_bandwidth};
 use passband::offline::scene::{read_merl, read_rgl, read_sgd};
 use passband::reflectance::analysis::{HIGHLIGHT, albedo, highlight, reciprocity_error};
@@ -22,7 +24,7 @@ const PAIRS: u32 = 50_000;
 /// Numbers of principal components whose error is reported.
 const COMPONENTS: [usize; 4] = [0, 1, 2, 4];
 
-/// Reports a reflectance's energy, reciprocity, highlight and bandwidth, and plots its lobes and slices
+/// Reports a reflectance's energy, reciprocity, highlight, bandwidth and fit by lobes, and plots its lobes and slices
 #[derive(clap::Args)]
 pub struct Args {
     /// A MERL table (.binary), an RGL file (.bsdf), a row of an SGD table (TABLE.csv:NAME) or a built-in's name
@@ -51,8 +53,9 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     }
     let subject = load(&args.material)?;
     let bandwidth = report(&subject)?;
+    let fit = report_fit(&subject)?;
     if let Some(output) = &args.output {
-        plot::write(output, &subject.title, subject.reflectance.as_ref(), &bandwidth)?;
+        plot::write(output, &subject.title, subject.reflectance.as_ref(), &bandwidth, &fit)?;
         crate::print(format_args!("\nplot: {}", output.display()))?;
     }
     Ok(ExitCode::SUCCESS)
@@ -139,4 +142,20 @@ fn report(subject: &Subject) -> Result<LobeBandwidth> {
     crate::print(format_args!("\nits relative error from the mean and so many principal components: {errors}"))?;
     crate::print(format_args!("components that hold 95 % of its energy around the mean: {}", bandwidth.components_for(0.95)))?;
     Ok(bandwidth)
+}
+
+/// Returns the fit of what the GPU shades.
+fn report_fit(subject: &Subject) -> Result<LobeFit> {
+    let clock = std::time::Instant::now();
+    let fit = lobe_fit(&subject.shaded, Budget::default(), fit_cache::cache_folder().as_deref());
+    let seconds = clock.elapsed().as_secs_f64();
+    crate::print(format_args!("\nfit by {} lobes and a cosine, found or read in {seconds:.2} s:", fit.count()))?;
+    let mut table = Table::new();
+    let degrees = ANGLES.map(|degrees| format!("{degrees}"));
+    table.load_style(presets::NOTHING).set_header(["degrees".into()].into_iter().chain(degrees).chain(["mean".into()]));
+    let errors = ANGLES.map(|degrees| format!("{:.4}", fit.at(degrees.to_radians().cos()).error));
+    let mean = format!("{:.4}", fit.mean_error());
+    table.add_row(["missed share of the light".into()].into_iter().chain(errors).chain([mean]));
+    crate::print(table)?;
+    Ok(fit)
 }

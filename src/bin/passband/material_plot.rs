@@ -2,6 +2,7 @@
 
 use crate::sheet::{self, Area, Drawn, RANGE, false_colour, legend};
 use glam::DVec3;
+use passband::distribution::LobeFit;
 use passband::offline::error::Result;
 use passband::reflectance::analysis::{albedo, at};
 use passband::reflectance::bandwidth::{SIDE, WIDTH};
@@ -30,12 +31,12 @@ const CELLS: usize = 180;
 type Chart<'a, 'b> = ChartContext<'a, BitMapBackend<'b>, Cartesian2d<RangedCoordf64, RangedCoordf64>>;
 
 /// Draws `reflectance` and writes it as a PNG.
-pub fn write(path: &Path, title: &str, reflectance: &dyn Reflectance, bandwidth: &LobeBandwidth) -> Result<()> {
+pub fn write(path: &Path, title: &str, reflectance: &dyn Reflectance, bandwidth: &LobeBandwidth, fit: &LobeFit) -> Result<()> {
     sheet::write(path, SIZE, title, |root| {
         let (upper, strips_at) = root.split_vertically(SIZE.1 as i32 - STRIPS);
         let panels = upper.split_evenly((2, 2));
         let [lobes_at, slice_at, image_at, energy_at] = panels.as_slice() else { return Err("the sheet has four panels".into()) };
-        lobes(lobes_at, reflectance)?;
+        lobes(lobes_at, reflectance, fit)?;
         slice(slice_at, reflectance)?;
         image(image_at, reflectance)?;
         energy(energy_at, reflectance)?;
@@ -93,8 +94,8 @@ fn decades(values: impl Iterator<Item = f64>) -> std::ops::Range<f64> {
     top - DECADES..top
 }
 
-/// Luminance in the plane of incidence over the light's angle; the viewer's mirror direction is on the right.
-fn lobes(area: &Area<'_>, reflectance: &dyn Reflectance) -> Drawn {
+/// Luminance in the plane of incidence over the light's angle, and its fit; the viewer's mirror direction is on the right.
+fn lobes(area: &Area<'_>, reflectance: &dyn Reflectance, fit: &LobeFit) -> Drawn {
     let direction = |degrees: f64| {
         let (sin, cos) = degrees.to_radians().sin_cos();
         DVec3::new(sin, 0.0, cos)
@@ -113,6 +114,19 @@ fn lobes(area: &Area<'_>, reflectance: &dyn Reflectance) -> Drawn {
     for ((points, colour), view) in curves.into_iter().zip(LOBES).zip(VIEWS) {
         let points = points.into_iter().map(|(x, y)| (x, logarithm(y, top))).collect();
         curve(&mut chart, points, colour, format!("viewer at {view} degrees"))?;
+    }
+    for (i, view) in VIEWS.into_iter().enumerate() {
+        let node = fit.at(view.to_radians().cos());
+        let value = |i: i32| {
+            let light = 89.9 * f64::from(i) / 1800.0;
+            let away = direction(-light);
+            (light, logarithm(luminance(node.evaluate(away)) / away.z, top))
+        };
+        let series = chart.draw_series(LineSeries::new((-1800..=1800).map(value), BLACK.mix(0.5).stroke_width(1)))?;
+        if i == 0 {
+            let name = format!("fit by {} lobes", fit.count());
+            series.label(name).legend(|(x, y)| PathElement::new([(x, y), (x + 24, y)], BLACK.mix(0.5).stroke_width(1)));
+        }
     }
     legend(&mut chart, SeriesLabelPosition::UpperLeft)
 }

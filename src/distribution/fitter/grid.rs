@@ -49,8 +49,7 @@ impl Grid {
 
         let (sin_o, cos_o) = view.sin_cos();
         let wo = DVec3::new(sin_o, 0.0, cos_o);
-        let mut grid =
-            Self { view, directions: Vec::new(), solid_angles: Vec::new(), values: Vec::new(), albedo: DVec3::ZERO };
+        let mut grid = Self { view, directions: Vec::new(), solid_angles: Vec::new(), values: Vec::new(), albedo: DVec3::ZERO };
         for row in rows.windows(2) {
             let (sin_b, cos_b) = (0.5 * (row[0] + row[1])).sin_cos();
             // Exact along the tilt.
@@ -89,5 +88,15 @@ fn divide(measure: impl Fn(f64) -> f64, limits: [f64; 2], step: f64) -> Vec<f64>
         }
         0.5 * (a + b)
     };
-    (0..=parts).map(|i| if i == 0 { limits[0] } else if i == parts { limits[1] } else { border(i) }).collect()
+    (0..=parts)
+        .map(|i| {
+            if i == 0 {
+                limits[0]
+            } else if i == parts {
+                limits[1]
+            } else {
+                border(i)
+            }
+        })
+        .collect()
 }

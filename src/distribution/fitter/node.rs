@@ -224,11 +224,7 @@ fn pull(chains: &[Chain], before: &State) -> impl Iterator<Item = f64> {
     })
 }
 
-fn scale<'a>(
-    mut to: nalgebra::DVectorViewMut<'_, f64>,
-    from: nalgebra::DVectorView<'a, f64>,
-    weights: &[f64],
-) {
+fn scale<'a>(mut to: nalgebra::DVectorViewMut<'_, f64>, from: nalgebra::DVectorView<'a, f64>, weights: &[f64]) {
     to.iter_mut().zip(from.iter()).zip(weights).for_each(|((to, from), w)| *to = from * w);
 }
 
