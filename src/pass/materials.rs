@@ -11,7 +11,7 @@ use crate::gpu::recorder::{Recorder, States};
 use crate::gpu::retire::{Build, Handle, Retired};
 use crate::gpu::sampler::Samplers;
 use crate::gpu::upload::{BufferUpload, ImageUpload};
-use crate::material::{MOST_KERNEL, Maps, Material};
+use crate::material::{MOST_KERNEL, Material};
 use crate::pass::fits::Packed;
 use crate::pass::maps::{MapImages, MapsUpload, Reading, Uses};
 use crate::pass::{brdf_map, vmf_mips};
