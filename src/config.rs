@@ -177,6 +177,8 @@ pub struct Config {
     pub directions: u32,
     /// The most lobes that a material is fitted by where light is looked up, 1 to 24.
     pub fit_lobes: u32,
+    /// The mean error of a fit at which fewer lobes are enough, 0 to 1.
+    pub fit_error: f64,
     /// Errors of a fit up to which the residual of [`Estimator::Residual`] is left out; with [`Rate::Bandwidth`] is shaded at the
     /// coarsest level; is shaded at that of half the pixels a side. Beyond it is shaded at every sample.
     pub residual_errors: [f32; 3],
@@ -218,6 +220,7 @@ impl Config {
             geometric: false,
             directions: 64,
             fit_lobes: MOST_LOBES as u32,
+            fit_error: Budget::default().error,
             residual_errors: RESIDUAL_ERRORS,
             exact_lobes: false,
             allocation: Allocation::default(),
@@ -229,7 +232,7 @@ impl Config {
 
     /// Of fits of materials.
     pub(crate) fn fit_budget(&self) -> Budget {
-        Budget { lobes: self.fit_lobes as usize, ..Budget::default() }
+        Budget { lobes: self.fit_lobes as usize, error: self.fit_error }
     }
 
     /// Whether levels follow from the predicted bandwidth of the image.
@@ -312,6 +315,7 @@ impl Config {
         )?;
         let most = MOST_LOBES as u32;
         check((1..=most).contains(&self.fit_lobes), "fit_lobes", &format!("1 to {most}"), self.fit_lobes.to_string())?;
+        check((0.0..=1.0).contains(&self.fit_error), "fit_error", "0 to 1", self.fit_error.to_string())?;
         let ascending = self.residual_errors.is_sorted() && self.residual_errors.iter().all(|e| e.is_finite());
         check(ascending, "residual_errors", "three finite numbers in ascending order", format!("{:?}", self.residual_errors))?;
         check((1..=256).contains(&self.probes), "probes", "1 to 256", self.probes.to_string())?;

@@ -272,6 +272,11 @@ pub(super) struct Settings {
     pub anisotropy: Key<f64>,
     pub lod_bias: Key<f64>,
     pub geometric: Key<bool>,
+    pub fit_lobes: Key<u32>,
+    pub fit_error: Key<f64>,
+    #[serde(default, deserialize_with = "some_exactly")]
+    pub residual_errors: Key<Vector>,
+    pub exact_lobes: Key<bool>,
 }
 
 /// Three numbers, or one for all three.

@@ -120,6 +120,10 @@ impl Scene {
                 [one, quarters] => Division::Lengths([one.unwrap_or(PRINTED_LENGTHS[0]), quarters.unwrap_or(PRINTED_LENGTHS[1])]),
             },
             geometric: settings.geometric.as_ref().map_or(base.geometric, |v| *v.get_ref()),
+            fit_lobes: settings.fit_lobes.as_ref().map_or(base.fit_lobes, |v| *v.get_ref()),
+            fit_error: settings.fit_error.as_ref().map_or(base.fit_error, |v| *v.get_ref()),
+            residual_errors: settings.residual_errors.as_ref().map_or(base.residual_errors, |v| v.get_ref().map(|e| e as f32)),
+            exact_lobes: settings.exact_lobes.as_ref().map_or(base.exact_lobes, |v| *v.get_ref()),
             directions: settings.budget.as_ref().map_or(base.directions, |v| *v.get_ref()),
             allocation: {
                 let rules = [Allocation::Equation8, Allocation::Deviation, Allocation::RelativeDeviation];

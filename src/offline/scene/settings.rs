@@ -19,6 +19,15 @@ impl Check<'_> {
         self.each(&s.lmax, |c, v| c.require(*v.get_ref() <= 5, &v.span(), "a level from 0 to 5", v.get_ref()))?;
         self.each(&s.anisotropy, |c, v| c.number(v, "1 to 16", |v| (1.0..=16.0).contains(&v)))?;
         self.each(&s.lod_bias, |c, v| c.number(v, "-16 to 16", |v| v.abs() <= 16.0))?;
+        self.each(&s.fit_lobes, |c, v| {
+            c.require((1..=24).contains(v.get_ref()), &v.span(), "a whole number from 1 to 24", v.get_ref())
+        })?;
+        self.each(&s.fit_error, |c, v| c.number(v, "0 to 1", |v| (0.0..=1.0).contains(&v)))?;
+        self.each(&s.residual_errors, |c, v| {
+            let errors = v.get_ref();
+            let fits = errors.is_sorted() && errors.iter().all(|e| e.is_finite());
+            c.require(fits, &v.span(), "three numbers in ascending order", format!("{errors:?}"))
+        })?;
         Ok(())
     }
 }
