@@ -1,5 +1,7 @@
 //! What a renderer is built for. Everything here is fixed until [`crate::Renderer::resize`] or a new renderer.
 
+use crate::distribution::fit::MOST_LOBES;
+use crate::distribution::fitter::Budget;
 use crate::distribution::{Division, Filter};
 use crate::error::{Error, Result};
 use crate::frequency::allocation::Allocation;
@@ -173,6 +175,8 @@ pub struct Config {
     /// samples a pixel, whatever stands for a pixel or more gets [`Config::samples_per_side`] times as many, and each finer level a
     /// quarter of the level above.
     pub directions: u32,
+    /// The most lobes that a material is fitted by where light is looked up, 1 to 24.
+    pub fit_lobes: u32,
     /// Errors of a fit up to which the residual of [`Estimator::Residual`] is left out; with [`Rate::Bandwidth`] is shaded at the
     /// coarsest level; is shaded at that of half the pixels a side. Beyond it is shaded at every sample.
     pub residual_errors: [f32; 3],
@@ -213,6 +217,7 @@ impl Config {
             literal_lobes: false,
             geometric: false,
             directions: 64,
+            fit_lobes: MOST_LOBES as u32,
             residual_errors: RESIDUAL_ERRORS,
             exact_lobes: false,
             allocation: Allocation::default(),
@@ -220,6 +225,11 @@ impl Config {
             gbuffer: GBufferSource::default(),
             modules: Modules::default(),
         }
+    }
+
+    /// Of fits of materials.
+    pub(crate) fn fit_budget(&self) -> Budget {
+        Budget { lobes: self.fit_lobes as usize, ..Budget::default() }
     }
 
     /// Whether levels follow from the predicted bandwidth of the image.
@@ -300,6 +310,8 @@ impl Config {
             &format!("Full, as the estimator is {:?}", self.estimator),
             format!("{:?}", self.rate),
         )?;
+        let most = MOST_LOBES as u32;
+        check((1..=most).contains(&self.fit_lobes), "fit_lobes", &format!("1 to {most}"), self.fit_lobes.to_string())?;
         let ascending = self.residual_errors.is_sorted() && self.residual_errors.iter().all(|e| e.is_finite());
         check(ascending, "residual_errors", "three finite numbers in ascending order", format!("{:?}", self.residual_errors))?;
         check((1..=256).contains(&self.probes), "probes", "1 to 256", self.probes.to_string())?;

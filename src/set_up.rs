@@ -72,10 +72,11 @@ impl Renderer {
         let (filter, bins) = (self.config.filter, self.config.bins);
         let (passes, samplers) = (self.passes.moments.as_ref(), &self.samplers);
         let (eps, estimator) = (config.predicts().then_some(config.eps), config.estimator);
+        let budget = config.fit_budget();
         let kept = self.materials.as_ref().map(|m| m.of_kinds.kinds);
         let (mut upload, filter, of_kinds) = Build::run(&self.cx, memory, |build| {
             let reading = Reading { filter, bins, rule, widened, passes, samplers };
-            let upload = MaterialsUpload::new(build, materials, &Uploading { reading, eps, estimator })?;
+            let upload = MaterialsUpload::new(build, materials, &Uploading { reading, eps, estimator, budget })?;
             let mut p = PassContext { build, modules, bridge, slots };
             let filter = filter::Filter::new(&mut p, config, upload.uses())?;
             let fresh = kept != Some(upload.kinds);

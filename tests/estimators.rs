@@ -114,7 +114,7 @@ fn assert_unbiased(label: &str, world: &World, config: &Config, frames: u32, pre
 #[test]
 fn every_estimator_has_the_reference_as_its_mean() {
     let coated = ggx(0.3, DVec3::new(0.6, 0.3, 0.05), DVec3::new(0.1, 0.3, 0.6));
-    for (mesh, model) in [("torus-knot", coated)] {
+    for (mesh, model) in [("bumpy-sphere", table("metallic-paint")), ("torus-knot", coated)] {
         let world = world(mesh, 48, model, sky("studio"));
         for estimator in [Estimator::Mis, Estimator::Brdf, Estimator::BrdfRandom, Estimator::Cv, Estimator::Residual] {
             let exact = Config { exact_lobes: true, ..config(EXTENT, estimator, 128) };

@@ -7,7 +7,7 @@
 #include "suns.glsl"
 
 layout(set = 2, binding = PREFILTER_BINDING) uniform sampler2D prefilter_first;      // level 0 the map, then x4 less a level
-layout(set = 2, binding = PREFILTER_BINDING + 1) uniform sampler2D prefilter_second; // twice the first's next level
+layout(set = 2, binding = PREFILTER_BINDING + 1) uniform sampler2D prefilter_second; // twice the first's next level, with its own level's size
 layout(set = 2, binding = PREFILTER_BINDING + 2) uniform sampler2D prefilter_irradiance;
 layout(set = 2, binding = PREFILTER_BINDING + 3, std430) readonly buffer PrefilterSuns {
     SunList suns;

@@ -2,10 +2,9 @@
 //! quadrature. Twin of `glsl/include/prefilter.glsl` and `glsl/prefilter`.
 //!
 //! The chain is two lat-long images with mips. Level 0 of the first is the environment itself without its suns
-//! ([`crate::distribution::suns`]); level l above is its convolution with a lobe whose standard deviation is a fixed number of
-//! that level's texels, so that the concentration falls by 4 a level. The second image begins with the size of the first's level
-//! 1 and holds twice the concentration in each level: a look-up lies between a level of one and a level of the other, a factor of
-//! 2 apart. (One image with a factor of 4 is off by several times as much half-way between its levels.) Rows go on beyond the
+//! ([`crate::distribution::suns`]); level l above is its convolution with a lobe whose standard deviation is one of
+//! that level's texels, so that the concentration falls by 4 a level. Level l of the second has twice the concentration of the first's
+//! level l + 1, and half its texels: a look-up lies between a level of one and a level of the other, a factor of 2 apart. (One image with a factor of 4 is off by several times as much half-way between its levels.) Rows go on beyond the
 //! poles by a tenth of the image each: the rows there are those of the meridian across, and bilinear look-ups need no case of
 //! their own.
 
@@ -13,8 +12,8 @@ use crate::sampling::LatLong;
 use glam::{DVec2, DVec3};
 use std::f64::consts::{PI, TAU};
 
-/// Square of a lobe's standard deviation in texels at the equator, in the first image; half of it in the second.
-pub const VARIANCE_IN_TEXELS: f64 = 4.0;
+/// Square of a lobe's standard deviation in texels at the equator, in the first image; twice as much in the second.
+pub const VARIANCE_IN_TEXELS: f64 = 1.0;
 /// Columns of the coarsest level.
 pub const LEAST_WIDTH: u32 = 8;
 /// Columns of the finest: larger environments are averaged to it.
@@ -23,7 +22,7 @@ pub const MOST_WIDTH: u32 = 2048;
 pub const SOURCE_WIDTH: u32 = 64;
 /// Factors of 2 between the concentration of the finest lobe and that of the map itself, whose bilinear look-ups are lobes of a
 /// variance of a quarter of a texel.
-pub const STEPS_TO_MAP: f64 = 5.0;
+pub const STEPS_TO_MAP: f64 = 3.0;
 
 /// Shape of a chain.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -55,7 +54,7 @@ impl Chain {
         f64::from(self.width >> level) / 16.0
     }
 
-    /// Concentration of the lobes of `level` of the first image, from level 1 on; level l - 1 of the second has twice as much.
+    /// Concentration of the lobes of `level` of the first image, from level 1 on; level - 1 of the second has twice as much.
     pub fn kappa(self, level: u32) -> f64 {
         let texel = TAU / f64::from(self.width >> level);
         1.0 / (VARIANCE_IN_TEXELS * texel * texel)
@@ -135,7 +134,7 @@ mod tests {
             assert_eq!(chain.levels_of(f64::INFINITY), (0, 0, 1.0));
         }
         let chain = Chain::of([1024, 512]);
-        assert!((chain.kappa(chain.levels() - 1) - 0.4).abs() < 0.1 && chain.kappa(1) > 1500.0);
+        assert!((chain.kappa(chain.levels() - 1) - 1.6).abs() < 0.1 && chain.kappa(1) > 6000.0);
     }
 
     /// A cosine about an axis is an eigenfunction: a lobe scales it by its mean cosine.

@@ -1,7 +1,7 @@
 //! A world on a device: uploaded once, rendered frame by frame, read back.
 
 use crate::Config;
-use crate::distribution::{Budget, chart};
+use crate::distribution::chart;
 use crate::gpu::access::Access;
 use crate::gpu::buffer::Buffer;
 use crate::gpu::image::ImageDesc;
@@ -76,7 +76,7 @@ impl Session {
         if config.estimator.looks_up() {
             let folder = fit_cache::cache_folder();
             let fit = |m: &mut crate::Material| {
-                m.lobe_fit = Some(Arc::new(fit_cache::lobe_fit(&m.model, Budget::default(), folder.as_deref())));
+                m.lobe_fit = Some(Arc::new(fit_cache::lobe_fit(&m.model, config.fit_budget(), folder.as_deref())));
             };
             materials.iter_mut().filter(|m| m.keeps_model()).for_each(fit);
         }

@@ -1,6 +1,7 @@
 //! Pass 0b: reflectance tables and importance tables, uploaded on change (Bagher 2011, section 3.3).
 
 use crate::config::Estimator;
+use crate::distribution::fitter::Budget;
 use crate::distribution::{Filter, LobeFit};
 use crate::error::{Error, Result};
 use crate::gpu::access::Access;
@@ -96,6 +97,8 @@ pub(crate) struct Uploading<'a> {
     /// At which threshold bandwidths are analysed, if the frame predicts it.
     pub eps: Option<f64>,
     pub estimator: Estimator,
+    /// Of fits that are not there yet.
+    pub budget: Budget,
 }
 
 /// What the prediction of bandwidth knows of the materials.
@@ -218,7 +221,8 @@ fn bandwidths(
 fn fit(material: &Material, io: &Uploading<'_>, found: bool) -> Option<Arc<LobeFit>> {
     let table = matches!(material.model, Model::Table(_) | Model::Turned(_));
     let same = table || material.keeps_model() && !io.reading.widened && !found;
-    if io.estimator.looks_up() && same { material.lobe_fit.clone() } else { None }
+    let build = || Arc::new(LobeFit::build(&material.model, io.budget));
+    (io.estimator.looks_up() && same).then(|| material.lobe_fit.clone().unwrap_or_else(build))
 }
 
 fn kinds(materials: &[Material], found: &[bool], packed: &Packed, filter: Filter) -> Kinds {
@@ -240,7 +244,7 @@ fn kinds(materials: &[Material], found: &[bool], packed: &Packed, filter: Filter
 
 impl MaterialsUpload {
     pub fn new(build: &mut Build<'_>, materials: &[Material], io: &Uploading<'_>) -> Result<Self> {
-        let Uploading { reading, eps, estimator } = io;
+        let Uploading { reading, eps, estimator, .. } = io;
         if materials.is_empty() || materials.len() > MAX_MATERIALS {
             return Err(Error::invalid("materials", format!("1 to {MAX_MATERIALS}"), materials.len()));
         }
@@ -267,12 +271,13 @@ impl MaterialsUpload {
         records.iter_mut().zip(&fitted.firsts).for_each(|(record, first)| record.kind[3] = *first);
         let kinds = kinds(materials, &maps.found, &fitted, reading.filter);
         let storage = vk::BufferUsageFlags::STORAGE_BUFFER;
-        let fits = estimator
+        let fit_upload = estimator
             .looks_up()
             .then(|| BufferUpload::new(build, "lobe fits", storage, bytemuck::cast_slice(&fitted.floats)))
             .transpose()?;
         let bandwidths = eps.map(|eps| bandwidths(build, materials, &mut records, eps)).transpose()?;
-        let importance = atlas::importance_tables(materials, &ladders);
+        let left: Vec<_> = fits.iter().map(|fit| fit.as_deref().filter(|_| estimator.has_residual())).collect();
+        let importance = atlas::importance_tables(materials, &ladders, &left);
         let image = |name, format, extent| ImageDesc::new(name, format, extent, vk::ImageUsageFlags::SAMPLED);
         let table_extent = [PHI_DIFF as u32, THETA_DIFF as u32 * size[0], THETA_HALF as u32 * size[1]];
         let texels = atlas::tables(&packed, size);
@@ -295,7 +300,7 @@ impl MaterialsUpload {
             )?,
             maps,
             bandwidths,
-            fits,
+            fits: fit_upload,
             kinds,
         })
     }

@@ -2,8 +2,8 @@
 //! looks them up; [`crate::distribution::prefilter`] and [`crate::distribution::suns`] are the f64 twins).
 //!
 //! Level 0 is the map without its suns. Of it come grids of nearly square texels, each a mean of the finer one's; every further
-//! level gathers the light under its lobe from the grid that is as fine as itself, and none from another level, so that no error
-//! adds up. All of it lies in one buffer, which is copied into an image with mips at the end.
+//! level gathers the light under its lobe from the grid whose texels are half or seven tenths of its standard deviation, and none from
+//! another level, so that no error adds up. All of it lies in one buffer, which is copied into an image with mips at the end.
 
 use crate::distribution::prefilter::{Chain, SOURCE_WIDTH, STEPS_TO_MAP};
 use crate::distribution::suns::{MAX_SUNS, Suns};
@@ -153,7 +153,7 @@ fn texels_below(chain: Chain, level: u32) -> u64 {
 /// The first texel of both images of the chain and of the irradiance, and the number of all texels.
 fn starts(chain: Chain) -> [u64; 4] {
     let second = texels_below(chain, chain.levels());
-    let irradiance = second + second - texels_below(chain, 1);
+    let irradiance = second + texels_below(chain, chain.levels() - 1);
     [0, second, irradiance, irradiance + texels_below(IRRADIANCE, 1)]
 }
 
@@ -194,7 +194,7 @@ impl Prefilter {
         };
         let images = [
             make("environment prefiltered", chain.extent(0), chain.levels())?,
-            make("environment prefiltered 2", chain.extent(1), chain.levels() - 1)?,
+            make("environment prefiltered 2", chain.extent(0), chain.levels() - 1)?,
             make("environment irradiance", IRRADIANCE.extent(0), 1)?,
         ];
         let storage = vk::BufferUsageFlags::STORAGE_BUFFER;
@@ -257,9 +257,9 @@ impl Prefilter {
         grids.iter().for_each(|grid| rec.buffer(grid, Access::COMPUTE_READ));
         rec.buffer(&texels, Access::COMPUTE_WRITE);
         rec.flush();
-        let convolve = |level: u32, to: u64, shape: Chain, kappa: Option<f64>| {
+        let convolve = |level: u32, to: u64, shape: Chain, kappa: Option<f64>, source: u32| {
             let [width, height] = shape.extent(level);
-            let source = if kappa.is_some() { level.min(last) } else { last };
+            let source = source.min(last);
             let push = ConvolvePush {
                 width: width as i32,
                 to: to as i32,
@@ -275,11 +275,10 @@ impl Prefilter {
         let [first, second, irradiance, _] = starts(chain);
         for level in 1..chain.levels() {
             let kappa = chain.kappa(level);
-            convolve(level, first + texels_below(chain, level), chain, Some(kappa));
-            let below = texels_below(chain, level) - texels_below(chain, 1);
-            convolve(level, second + below, chain, Some(2.0 * kappa));
+            convolve(level, first + texels_below(chain, level), chain, Some(kappa), level - 1);
+            convolve(level - 1, second + texels_below(chain, level - 1), chain, Some(2.0 * kappa), level - 1);
         }
-        convolve(0, irradiance, IRRADIANCE, None);
+        convolve(0, irradiance, IRRADIANCE, None, last);
 
         rec.buffer(&texels, Access::TRANSFER_READ);
         images.iter().for_each(|image| rec.overwrite(image, Access::TRANSFER_WRITE));

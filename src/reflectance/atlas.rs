@@ -1,5 +1,6 @@
 //! How the tables of all materials lie in the textures that shaders read.
 
+use crate::distribution::LobeFit;
 use crate::material::Material;
 use crate::reflectance::importance::{COLUMNS, Cell, DENSITY_COLUMNS, DENSITY_ROWS, ImportanceTable, ROWS, VIEW_ANGLES};
 use crate::reflectance::ladder::Ladder;
@@ -11,11 +12,16 @@ use std::sync::Arc;
 /// Importance tables one below the other: on every device, images may have 4096 rows.
 const TABLES_A_COLUMN: usize = 64;
 
-/// The tables of all ladders one after the other, on as many threads as there are processors.
-pub fn importance_tables(materials: &[Material], ladders: &[Ladder]) -> Vec<ImportanceTable> {
-    let all: Vec<_> = materials.iter().zip(ladders).flat_map(|(m, l)| (0..l.steps()).map(move |i| (m, l, i))).collect();
+/// The tables of all ladders one after the other, on as many threads as there are processors: of what `fits` leave where there is one.
+pub fn importance_tables(materials: &[Material], ladders: &[Ladder], fits: &[Option<&LobeFit>]) -> Vec<ImportanceTable> {
+    let each = materials.iter().zip(ladders).zip(fits);
+    let all: Vec<_> = each.flat_map(|((m, l), fit)| (0..l.steps()).map(move |i| (m, l, *fit, i))).collect();
     let threads = std::thread::available_parallelism().map_or(1, usize::from);
-    let build = |part: &[(&Material, &Ladder, usize)]| part.iter().map(|(m, l, i)| l.table(m, *i)).collect::<Vec<_>>();
+    let table = |&(m, l, fit, i): &(&Material, &Ladder, Option<&LobeFit>, usize)| match fit {
+        Some(fit) => ImportanceTable::build_residual(&m.model, fit),
+        None => l.table(m, i),
+    };
+    let build = |part: &[(&Material, &Ladder, Option<&LobeFit>, usize)]| part.iter().map(table).collect::<Vec<_>>();
     std::thread::scope(|scope| {
         let parts = all.chunks(all.len().div_ceil(threads).max(1));
         let running: Vec<_> = parts.map(|part| (part, scope.spawn(move || build(part)))).collect();

@@ -2,6 +2,7 @@
 
 use super::{aligned, bounded};
 use passband::offline::bench::cases::Half;
+use passband::offline::bench::reached::{Reached, Way};
 use passband::offline::bench::report::{Report, SceneReport};
 use passband::offline::bench::statistics::Ratio;
 use passband::offline::bench::table::{Gained, Line, Target, Verdict};
@@ -89,6 +90,41 @@ fn speeds(lines: &[&Line]) -> String {
         "together",
         "overhead",
         "fall-back",
+    ];
+    aligned(&header, 2, lines.iter().map(row))
+}
+
+/// What is as good as full rate, one line a scene and number of directions.
+pub fn reached(lines: &[Reached]) -> String {
+    let way = |way: &Option<Way>| {
+        way.as_ref().map_or(String::new(), |w| {
+            format!("{:.1} [{:.1}, {:.1}]", w.speed_up.ratio, w.speed_up.interval[0], w.speed_up.interval[1])
+        })
+    };
+    let row = |line: &Reached| {
+        let best = line.best().map_or(["none".into(), String::new(), String::new()], |w| {
+            [w.variant.clone(), format!("{:.1}", w.psnr), format!("{:.1e}", w.relmse)]
+        });
+        let full = [format!("{:.1}", line.full_ms), format!("{:.1}", line.psnr), format!("{:.1e}", line.relmse)];
+        let cost = line.base_cost.map_or(String::new(), |c| format!("{c:.1}"));
+        let half = line.half.map_or("", |half| if half == Half::Tuning { "tuning" } else { "judged" });
+        let start = [line.scene.clone(), half.into(), line.directions.to_string()];
+        start.into_iter().chain(full).chain(line.ways.iter().map(way)).chain(best).chain([cost]).collect()
+    };
+    let header = [
+        "scene",
+        "half",
+        "N",
+        "full ms",
+        "PSNR",
+        "relMSE",
+        "base",
+        "cv",
+        "residual",
+        "best",
+        "its PSNR",
+        "its relMSE",
+        "base cost",
     ];
     aligned(&header, 2, lines.iter().map(row))
 }

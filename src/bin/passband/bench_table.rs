@@ -23,6 +23,11 @@ rate has the predicted one's rmse, which is adaptivity's gain alone; best: the s
 brdf-random on both sides; MIS alone: full rate with mis against full rate with brdf-random at equal rmse; together: the predicted
 rate with mis against full rate with brdf-random; overhead: bandwidth, pyramid, classify and upsample over full rate's frame";
 
+/// What the table of the suite residual has in its columns.
+const REACHED: &str = "What is as good as full rate with mis of N directions, by PSNR and relMSE both, and full rate's frame time over its own
+base: light looked up; cv: with what is left estimated everywhere; residual: where it is worth it; base cost: the whole frame of looked-up
+light, in directions a covered pixel of full rate";
+
 /// The whole report.
 pub fn text(report: &Report) -> String {
     let device = report.head.device.as_ref().map_or("none".into(), |d| format!("{} ({})", d.name, d.driver));
@@ -39,6 +44,9 @@ pub fn text(report: &Report) -> String {
     if !report.table.is_empty() {
         parts.push(format!("{COLUMNS}\n{}", gains::halves(report)));
         parts.extend(gains::tables(&report.table));
+    }
+    if !report.reached.is_empty() {
+        parts.push(format!("{REACHED}\n{}\n\n{}", gains::halves(report), gains::reached(&report.reached)));
     }
     if !report.targets.is_empty() {
         parts.push(format!("Aims\n{}", gains::targets(&report.targets)));

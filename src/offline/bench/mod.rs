@@ -10,6 +10,7 @@ pub mod equal;
 pub mod figures;
 pub mod judge;
 pub mod quality;
+pub mod reached;
 pub mod reference;
 pub mod report;
 pub mod runner;

@@ -6,6 +6,7 @@ use crate::offline::bench::curves::Curve;
 use crate::offline::bench::environment::EnvironmentTimes;
 use crate::offline::bench::equal::{Equal, Is};
 use crate::offline::bench::quality::Noise;
+use crate::offline::bench::reached::Reached;
 use crate::offline::bench::runner::{Measured, Part};
 use crate::offline::bench::statistics::{Ratio, Summary, ratio_of_medians};
 use crate::offline::bench::table::{Line, Target};
@@ -53,6 +54,8 @@ pub struct Report {
     pub summary: Vec<Gain>,
     /// The suite bagher: full rate beside the predicted one, for each number of directions that both have.
     pub table: Vec<Line>,
+    /// The suite residual: what is as good as full rate, and how much sooner.
+    pub reached: Vec<Reached>,
     /// What was aimed at.
     pub targets: Vec<Target>,
     /// Wall times of the run.

@@ -7,7 +7,7 @@ use crate::offline::bench::reference::Converged;
 use crate::offline::bench::report::{Head, Report, Row, SceneReport, Seconds, Skipped, gains};
 use crate::offline::bench::runner::Runner;
 use crate::offline::bench::variants::{self, Family};
-use crate::offline::bench::{curves, environment, judge, table};
+use crate::offline::bench::{curves, environment, judge, reached, table};
 use crate::offline::error::Result;
 use crate::offline::headless::Options;
 use crate::offline::render::Settings;
@@ -23,6 +23,8 @@ pub enum Suite {
     Passes,
     /// Shading at other rates against full rate.
     Bagher,
+    /// Light that is looked up and its residual against full rate.
+    Residual,
 }
 
 /// How much of it.
@@ -66,6 +68,7 @@ impl Suite {
         match self {
             Self::Passes => "passes",
             Self::Bagher => "bagher",
+            Self::Residual => "residual",
         }
     }
 
@@ -73,6 +76,7 @@ impl Suite {
         match self {
             Self::Passes => variants::PASSES,
             Self::Bagher => variants::BAGHER,
+            Self::Residual => variants::RESIDUAL,
         }
     }
 
@@ -81,7 +85,7 @@ impl Suite {
         match self {
             Self::Passes => 0,
             // Pairs of them give the noise of one.
-            Self::Bagher => 2,
+            Self::Bagher | Self::Residual => 2,
         }
     }
 }
@@ -128,6 +132,7 @@ pub fn run(order: &Order, keep: Option<&mut Keep<'_>>, progress: &mut Progress<'
         skipped: Vec::new(),
         summary: Vec::new(),
         table: Vec::new(),
+        reached: Vec::new(),
         targets: Vec::new(),
         seconds: Seconds::default(),
     };
@@ -152,6 +157,10 @@ pub fn run(order: &Order, keep: Option<&mut Keep<'_>>, progress: &mut Progress<'
     if order.suite == Suite::Bagher {
         report.table = table::lines(&report.scenes);
         report.targets = table::targets(&report.scenes, &report.table);
+    }
+    if order.suite == Suite::Residual {
+        report.reached = reached::lines(&report.scenes);
+        report.targets = reached::targets(&report.reached);
     }
     report.seconds.total = clock.elapsed().as_secs_f64();
     Ok(report)
@@ -192,10 +201,10 @@ impl Run<'_, '_, '_> {
                 told(self.progress, "curves");
                 found.curves = curves::of(&world, &base)?;
             }
-            if let Some(light) = &world.environment {
+            if let (Some(light), Suite::Bagher) = (&world.environment, order.suite) {
                 found.environment = Some(environment::times(&light.map, &base, self.report.head.rounds)?);
             }
-            if let Some(keep) = self.keep.as_mut().filter(|_| pictured) {
+            if let (Some(keep), Suite::Bagher) = (self.keep.as_mut().filter(|_| pictured), order.suite) {
                 told(self.progress, "figures");
                 let stage = figures::Stage { world: &world, base: &base, reference: &reference, found: &found };
                 stage.draw(&mut |figure| keep(name, figure))?;

@@ -83,6 +83,31 @@ pub const BAGHER: &[Family] = &[
     further("bandwidth spc=4 lmax=4", |c| (c.samples_per_cycle, c.lmax) = (Some(4.0), 4)),
 ];
 
+/// Light that is looked up, and what of it is estimated, beside full rate.
+pub const RESIDUAL: &[Family] = &[
+    Family { directions: &[64, 16, 256], more: &[4, 1024], ..FULL },
+    Family { name: "base", estimator: Estimator::Preconvolved, directions: &[1], ..FULL },
+    Family { name: "cv", estimator: Estimator::Cv, directions: &[16], more: &[4, 64], ..FULL },
+    Family { name: "residual", estimator: Estimator::Residual, directions: &[16, 64], more: &[256], ..BANDWIDTH },
+    Family { name: "full brdf-random", estimator: Estimator::BrdfRandom, directions: &[64], more: &[256], ..FULL },
+    Family { name: "bandwidth", directions: &[64], more: &[16, 256], ..BANDWIDTH },
+    Family {
+        name: "base lobes=8",
+        part: Part::Setting,
+        estimator: Estimator::Preconvolved,
+        change: |c| c.fit_lobes = 8,
+        directions: &[],
+        more: &[1],
+        ..FULL
+    },
+    further_residual("residual everywhere", |c| c.residual_errors = [0.0; 3]),
+    further_residual("residual coarser", |c| c.residual_errors = [0.0, 0.2, 0.5]),
+];
+
+const fn further_residual(name: &'static str, change: fn(&mut Config)) -> Family {
+    Family { estimator: Estimator::Residual, ..further(name, change) }
+}
+
 /// All of `families`, in the place of what `base` says. `all` is for the full preset.
 pub fn variants(families: &[Family], base: &Settings, all: bool) -> Vec<Variant> {
     let of = |family: &Family| {
