@@ -46,6 +46,8 @@ layout(constant_id = 13) const uint APPROXIMATING = 1u;
 layout(constant_id = 14) const uint RATIO = 0u;
 // Whether lobes are taken to be just what look-ups of them hold.
 layout(constant_id = 15) const uint EXACT = 0u;
+// Whether directions are drawn from the reflectance alone.
+layout(constant_id = 16) const uint ALONE = 0u;
 
 layout(set = 2, binding = 3, std430) readonly buffer Arguments {
     uint groups_x, groups_y, groups_z;
@@ -95,8 +97,7 @@ uint turn(ivec2 p, int l, int finer) {
 void split(uint n) {
     uint area = LOCAL_LIGHTS ? frame.lights.y : 0u;
     uint sources = area + (push.environment_samples > 0u ? 1u : 0u);
-    bool alone = ESTIMATOR == ESTIMATOR_BRDF || ESTIMATOR == ESTIMATOR_BRDF_RANDOM;
-    if (alone || sources == 0u) {
+    if (ALONE != 0u || sources == 0u) {
         brdf_samples = n;
         environment_samples = 0u;
         light_samples = 0u;
@@ -221,7 +222,7 @@ vec3 brdf_contribution(Surface s, vec3 p, uvec2 u) {
     vec3 w = to_world(s.frame, wi);
     vec4 light = environment_lookup(w);
     vec4 value = reflected(s, wi, h);
-    bool alone = ESTIMATOR == ESTIMATOR_BRDF || ESTIMATOR == ESTIMATOR_BRDF_RANDOM;
+    bool alone = ALONE != 0u;
     drawn = drawn > 0.0 ? drawn : value.a;
     float weight_density = alone ? drawn : value.a;
     float brdf = float(brdf_samples) * weight_density;
@@ -342,7 +343,11 @@ void main() {
     if (ESTIMATOR == ESTIMATOR_RESIDUAL) {
         Approximation a = approximation_load(m, s.lobes, f.view);
         if (approximation_error(a) <= push.negligible) {
-            store(p, l, vec3(RATIO != 0u ? 1.0 : 0.0));
+            float nothing = 0.0;
+            if (RATIO != 0u) {
+                nothing = 1.0;
+            }
+            store(p, l, vec3(nothing));
             return;
         }
         approximate(s, a);
@@ -353,7 +358,7 @@ void main() {
         uint point = before * brdf_samples + i;
         sum += brdf_contribution(s, at, ESTIMATOR == ESTIMATOR_BRDF_RANDOM ? random_point(point, seed) : sobol_point(point, seeds));
     }
-    if (ESTIMATOR == ESTIMATOR_MIS || ESTIMATOR == ESTIMATOR_RESIDUAL) {
+    if (ALONE == 0u) {
         seeds = sobol_seeds(seed + 1u);
         for (uint i = 0u; i < environment_samples; ++i) {
             sum += environment_contribution(s, sobol_point(before * environment_samples + i, seeds));
@@ -365,8 +370,10 @@ void main() {
             }
         }
     }
-    if (LOCAL_LIGHTS && ESTIMATOR != ESTIMATOR_RESIDUAL) {
-        sum += exact_lights(s, at);
+    if (ESTIMATOR != ESTIMATOR_RESIDUAL) {
+        if (LOCAL_LIGHTS) {
+            sum += exact_lights(s, at);
+        }
     }
     if (RATIO != 0u) {
         known += push.offset;

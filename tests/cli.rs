@@ -80,7 +80,7 @@ fn every_documented_flag_works_or_is_not_supported_yet() {
     let folder = Folder::new("flags");
     let filters = "point naive fixed toksvig toksvig-lobe lean lean-lobe leadr tk fournier4 fournier7 gmm gmm-unaligned vmf1 vmf4 \
                    vmf8 vmf clusters bruteforce supersample";
-    let layers = "level weight samples bandwidth spread shaded lobes mip depth normal material curvature uv base";
+    let layers = "level weight samples bandwidth spread shaded lobes mip depth normal material curvature uv base residual";
     let choices = [
         ("--rate", "full half quarter luminance bandwidth oracle"),
         ("--estimator", "mis brdf brdf-random preconvolved cv residual"),
@@ -106,6 +106,7 @@ fn every_documented_flag_works_or_is_not_supported_yet() {
             let beside: &[&str] = match value {
                 _ if predicted => &["--rate", "bandwidth"],
                 "base" => &["--estimator", "preconvolved"],
+                "residual" if flag == "--aov" => &["--estimator", "residual", "--rate", "bandwidth"],
                 "lobes" => &["--filter", "vmf"],
                 _ => &[],
             };

@@ -36,11 +36,13 @@ pub enum Aov {
     Samples,
     /// Radiance that is looked up: pre-convolved light, suns and exact lights.
     Base,
+    /// What is estimated beside that: radiance to add (`cv`), or the factor on it (`residual`).
+    Residual,
     /// Lobes that the filter found, 0 where the material's own stay.
     Lobes,
 }
 
-const ALL: [(&str, Aov); 15] = [
+const ALL: [(&str, Aov); 16] = [
     ("depth", Aov::Depth),
     ("normal", Aov::Normal),
     ("material", Aov::Material),
@@ -55,6 +57,7 @@ const ALL: [(&str, Aov); 15] = [
     ("shaded", Aov::Shaded),
     ("samples", Aov::Samples),
     ("base", Aov::Base),
+    ("residual", Aov::Residual),
     ("lobes", Aov::Lobes),
 ];
 const LATER: [&str; 1] = ["mip"];
@@ -170,9 +173,14 @@ impl Aov {
                 let all = covered.of((0..covered.words.len()).map(value).collect()).map(|t| f32::from_bits(t[0]));
                 scalar(all.iter().zip(mask).map(|(v, mask)| if mask > 0.0 { *v } else { 0.0 }).collect())
             }
-            Self::Base => {
+            Self::Residual if !config.estimator.has_residual() => {
+                let expected = "--estimator cv or residual beside it";
+                Err(Error::argument("--aov residual", expected, config.estimator.name()))
+            }
+            Self::Base | Self::Residual => {
                 let image = match config.estimator {
                     Estimator::Preconvolved => "radiance",
+                    Estimator::Cv | Estimator::Residual if self == Self::Residual => "radiance",
                     Estimator::Cv | Estimator::Residual => "base",
                     _ => {
                         let expected = "--estimator preconvolved, cv or residual beside it";

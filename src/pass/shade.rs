@@ -129,7 +129,12 @@ impl Shade {
             let constants: Vec<_> = own
                 .into_iter()
                 .chain(lobe_constants(config, kinds))
-                .chain([kinds.most_lobes, u32::from(ratio), u32::from(config.exact_lobes)])
+                .chain([
+                    kinds.most_lobes,
+                    u32::from(ratio),
+                    u32::from(config.exact_lobes),
+                    u32::from(!config.estimator.combines()),
+                ])
                 .collect();
             ComputePipeline::new(p.build, p.modules, &INTERFACE, p.bridge, p.slots, &constants)
         };
