@@ -83,11 +83,12 @@ pub(crate) struct Shade {
 }
 
 /// Constants of `glsl/include/lobes.glsl`, and whether there are materials whose lobes the filter does not find.
-pub(crate) fn lobe_constants(config: &Config, unfiltered: bool) -> [u32; 5] {
+pub(crate) fn lobe_constants(config: &Config, unfiltered: bool) -> [u32; 6] {
     let layers = config.filter.lobe_layers();
     let slopes = config.filter.has_slopes();
     let smith = config.filter == Filter::Leadr;
-    [layers.max(1), u32::from(layers > 0), u32::from(slopes), u32::from(smith), u32::from(unfiltered)]
+    let elliptic = config.filter.is_elliptic();
+    [layers.max(1), u32::from(layers > 0), u32::from(slopes), u32::from(smith), u32::from(unfiltered), u32::from(elliptic)]
 }
 
 impl Shade {

@@ -1,0 +1,71 @@
+// The lobes of clusters of what a pixel covers: between base texels, which have their lobes as they are, and the levels of moments.
+// Part of filter.comp.
+
+void keep_ellipse(ivec2 p, inout Found f, Ellipse e, float mass, vec3 normal) {
+    if (f.count >= LOBES) {
+        return;
+    }
+    float along = e.kappa / e.ratio, across = e.kappa * e.ratio;
+    along /= 1.0 + 0.5 * along * f.kernel;
+    across /= 1.0 + 0.5 * across * f.kernel;
+    float kappa = sqrt(along * across), share = mass * moments_area(kappa, f.lobes) / f.area;
+    vec3 mu = f.frame * moments_direction(e.mu), below = f.frame * moments_direction(normal);
+    imageStore(lobes, ivec3(p, int(f.count)), found_pack_along(mu, f.frame * e.axis, sqrt(across / along), below, kappa, share));
+    f.count += 1u;
+    f.sharpest = share > MATTERS ? max(f.sharpest, across) : f.sharpest;
+}
+
+void decode_clusters(ivec2 p, MapRecord record, vec2 uv, Reach r, uint lobe_layer, inout Found f) {
+    vec4 firsts[MOST_CLUSTERS];
+    vec2 seconds[MOST_CLUSTERS];
+    for (uint i = 0u; i < MOST_CLUSTERS; ++i) {
+        firsts[i] = vec4(0.0);
+        seconds[i] = vec2(0.0);
+    }
+    uint first = record.clusters.x, all = record.clusters.y;
+    float coarse = min(r.level, 1.0), level = max(r.level - 1.0, 0.0);
+    for (float tap = 0.0; tap < r.taps; ++tap) {
+        vec2 at = reach_tap(r, uv, tap);
+        float share = coarse / r.taps;
+        // Layers beyond the material's own are another's.
+        for (uint i = 0u; i < CLUSTERS; i += 2u) {
+            firsts[i] += fetch(CELL_CLASSES, record.cells, i, at, level) * (i < all ? share : 0.0);
+            vec4 two = fetch(CELL_CLASSES, record.cells, all + i / 2u, at, level) * (i < all ? share : 0.0);
+            seconds[i] += two.xy;
+            seconds[i + 1u] += two.zw;
+            if (i + 1u < CLUSTERS) {
+                firsts[i + 1u] += fetch(CELL_CLASSES, record.cells, i + 1u, at, level) * (i + 1u < all ? share : 0.0);
+            }
+        }
+        vec2 place = vec2(at.x, 1.0 - at.y) * r.size - 0.5, corner_of = floor(place), part = place - corner_of;
+        // Base texels, where they count.
+        for (uint k = 0u; k < (coarse < 1.0 ? 4u : 0u); ++k) {
+            vec2 corner = vec2(k & 1u, k >> 1), weight = mix(1.0 - part, part, corner);
+            vec2 centre = (corner_of + corner + 0.5) / r.size;
+            for (uint j = 0u; j < record.count; ++j) {
+                vec4 lobe = fetch(MOMENT_CLASSES, record.moments, lobe_layer + j, vec2(centre.x, 1.0 - centre.y), 0.0);
+                float own = record.weights[j] * weight.x * weight.y * ((1.0 - coarse) / r.taps);
+                Placed placed = cluster_place(first, all, lobe.xyz, lobe.w, own, record.lobes);
+                for (uint i = 0u; i < MOST_CLUSTERS; ++i) {
+                    bool mine = i == placed.cluster;
+                    firsts[i] += mine ? placed.first : vec4(0.0);
+                    seconds[i] += mine ? placed.second : vec2(0.0);
+                }
+            }
+        }
+    }
+    vec3 normal = record.upright != 0u ? vec3(0.0) : look_up(MOMENT_CLASSES, record.moments, 0u, uv, r).xyz;
+    vec3 sum = vec3(0.0);
+    float mass = 0.0;
+    f.area = record.facing;
+    for (uint i = 0u; i < CLUSTERS; ++i) {
+        float q = i < all ? firsts[i].x : 0.0;
+        if (q > LEAST_WEIGHT) {
+            Ellipse e = cluster_decode(clusters[first + i], firsts[i], seconds[i]);
+            keep_ellipse(p, f, e, q, record.upright != 0u ? e.mu : normal);
+            sum += e.mu * q;
+            mass += q;
+        }
+    }
+    f.mean = record.upright != 0u ? sum / max(mass, LEAST_WEIGHT) : normal;
+}
