@@ -182,7 +182,7 @@ impl Filter {
     }
 
     /// Layers of the image of a sample's lobes: one a lobe, two a Gaussian of slopes; none if it makes no lobes.
-    pub(crate) fn lobe_layers(self) -> u32 {
+    pub fn lobe_layers(self) -> u32 {
         let lobes = |apart| if apart { MOST_BASE_LOBES } else { 1 };
         let layers = match self.storage() {
             None => 0,
