@@ -176,23 +176,25 @@ fn frames_are_those_of_the_quadrature() {
     let metal = || ggx(0.15, DVec3::splat(0.9), DVec3::splat(0.3));
     let two = || lobes(&[(0.6, 60.0), (-0.4, 30.0)]);
     let (odd, few) = ([67, 45], [13, 9]);
-    // Frames, which many lobes are drawn in.
+    let mut wrong = Vec::new();
+    // Directions and frames: of those that draw lobes each frame has others, and the reference driver ends a shader's loops after 65 535
+    // rounds in all.
     let cases = [
-        ("ggx", Filter::Clusters, metal(), all(odd), 1),
-        ("blinn-phong", Filter::Clusters, blinn_phong(), all(odd), 1),
-        ("one lobe", Filter::Clusters, lobes(&[(0.0, 60.0)]), all(odd), 1),
-        ("two lobes", Filter::Clusters, two(), tiled(normals([64; 2], 0.3), None), 1),
-        ("ggx", Filter::Fournier4, metal(), all(few), 1),
-        ("two lobes", Filter::Fournier7, two(), all(few), 1),
-        ("one lobe", Filter::BruteForce, lobes(&[(0.0, 60.0)]), all(few), 32),
+        ("ggx", Filter::Clusters, metal(), all(odd), [2048, 1]),
+        ("blinn-phong", Filter::Clusters, blinn_phong(), all(odd), [2048, 1]),
+        ("one lobe", Filter::Clusters, lobes(&[(0.0, 60.0)]), all(odd), [2048, 1]),
+        ("two lobes", Filter::Clusters, two(), tiled(normals([64; 2], 0.3), None), [2048, 1]),
+        ("ggx", Filter::Fournier4, metal(), all(few), [256, 6]),
+        ("two lobes", Filter::Fournier7, two(), all(few), [256, 6]),
+        ("one lobe", Filter::BruteForce, lobes(&[(0.0, 60.0)]), all(few), [64, 40]),
     ];
-    for (name, filter, model, maps, frames) in cases {
+    for (name, filter, model, maps, [directions, frames]) in cases {
         let world = scene("sphere", model, maps);
         let options = Quadrature { filter, ..Quadrature::default() };
-        let expected = expected_with(&world, [64, 64], options, |interior| {
-            interior.into_iter().filter(|i| (i % 64 + i / 64) % 4 == 0).collect()
+        let expected = expected_with(&world, [48, 48], options, |interior| {
+            interior.into_iter().filter(|i| (i % 48 + i / 48) % 3 == 0).collect()
         });
-        let config = Config { filter, ..config(expected.extent, Estimator::Mis, if frames > 1 { 128 } else { 4096 }) };
+        let config = Config { filter, ..config(expected.extent, Estimator::Mis, directions) };
         let (mean, _) = Stage::new(&world, &config).mean(0, frames);
         let radiance = |i: usize| mean[i];
         let all = ratio(&expected.pixels, radiance);
@@ -201,8 +203,11 @@ fn frames_are_those_of_the_quadrature() {
         let name = format!("{name}, {}", filter.name());
         println!("{name:24} mean {all:.5}, worst of {} tiles {tile:.5}, {} pixels", tiles.len(), expected.pixels.len());
         assert!(expected.error <= 1e-3 && expected.pixels.len() > 200);
-        assert!((all - 1.0).abs() <= 0.004 && (tile - 1.0).abs() <= 0.02, "{name}: mean {all:.5}, tile {tile:.5}");
+        if (all - 1.0).abs() > 0.004 || (tile - 1.0).abs() > 0.02 {
+            wrong.push(name);
+        }
     }
+    assert!(wrong.is_empty(), "{wrong:?}");
 }
 
 /// The built-in map `name` on a tilted plane under a light, minified.
@@ -222,7 +227,7 @@ fn plane(name: &str, light: Light) -> World {
 
 #[test]
 fn clusters_are_nearer_to_the_truth_than_cells() {
-    const SIDE: usize = 32;
+    const SIDE: usize = 28;
     const FINER: usize = 20;
     let lamp = Light::Point { position: [0.5, 1.0, 1.2], intensity: [1.0; 3] };
     for name in ["bumps", "disk"] {
@@ -237,7 +242,7 @@ fn clusters_are_nearer_to_the_truth_than_cells() {
             (0..FINER * FINER).map(move |k| (y + k / FINER) * SIDE * FINER + x + k % FINER)
         };
         let inside: Vec<_> = (0..SIDE * SIDE).filter(|i| below(*i).all(|k| fine.coverage(k) == 1.0)).collect();
-        assert!(inside.len() > 150, "{}", inside.len());
+        assert!(inside.len() > 100, "{}", inside.len());
         let truth: Vec<_> =
             inside.iter().map(|i| below(*i).map(|k| fine.radiance(k)).sum::<DVec3>() / (FINER * FINER) as f64).collect();
         let squared: f64 = truth.iter().map(|t| t.length_squared()).sum();
@@ -246,8 +251,8 @@ fn clusters_are_nearer_to_the_truth_than_cells() {
             let off: f64 = inside.iter().zip(&truth).map(|(i, t)| (image.radiance(*i) - t).length_squared()).sum();
             (off / squared).sqrt()
         };
-        let [clusters, vmf8, toksvig, fournier] =
-            [Filter::Clusters, Filter::Vmf8, Filter::ToksvigLobe, Filter::Fournier7].map(error);
+        let all = [Filter::Clusters, Filter::Vmf8, Filter::ToksvigLobe, Filter::Fournier7];
+        let [clusters, vmf8, toksvig, fournier] = all.map(error);
         println!("{name}: clusters {clusters:.3}, vmf8 {vmf8:.3}, toksvig-lobe {toksvig:.3}, fournier7 {fournier:.3}");
         assert!(clusters < 0.7 * vmf8 && clusters < 0.5 * toksvig && clusters < 1.4 * fournier, "{name}");
     }
