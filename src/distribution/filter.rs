@@ -181,6 +181,13 @@ impl Filter {
         self.storage() == Some(Storage::Base)
     }
 
+    /// The most lobes that it finds at a sample of a material that has one, 0 if it makes none.
+    pub fn most_lobes(self) -> u32 {
+        let apart = matches!(self.storage(), Some(Storage::Directions { apart: true } | Storage::Slopes { apart: true }));
+        let each = if self.has_slopes() { 2 } else { 1 };
+        self.lobe_layers() / each / if apart { MOST_BASE_LOBES as u32 } else { 1 }
+    }
+
     /// Layers of the image of a sample's lobes: one a lobe, two a Gaussian of slopes; none if it makes no lobes.
     pub fn lobe_layers(self) -> u32 {
         let lobes = |apart| if apart { MOST_BASE_LOBES } else { 1 };
