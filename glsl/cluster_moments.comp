@@ -16,6 +16,7 @@ layout(push_constant) uniform Push {
     uint kind;      // LOBES_* of moments.glsl
     uint first;     // cluster of the material's
     uint all;       // of these
+    uint upright;   // whether lobes are about the normal, which is in the layer before theirs else
 };
 
 void main() {
@@ -24,15 +25,16 @@ void main() {
         return;
     }
     vec4 firsts[MOST_CLUSTERS];
-    vec2 seconds[MOST_CLUSTERS];
+    vec4 seconds[MOST_CLUSTERS]; // with the normal
     for (uint i = 0u; i < MOST_CLUSTERS; ++i) {
         firsts[i] = vec4(0.0);
-        seconds[i] = vec2(0.0);
+        seconds[i] = vec4(0.0);
     }
     Cover columns = cover(p.x, from.x, size.x), rows = cover(p.y, from.y, size.y);
     for (int y = rows.first; y <= rows.last; ++y) {
         for (int x = columns.first; x <= columns.last; ++x) {
             float share = cover_share(columns, x, from.x, size.x) * cover_share(rows, y, from.y, size.y);
+            vec2 normal = upright != 0u ? vec2(0.0) : stereographic_of(imageLoad(lobes, ivec3(x, y, lobe_layer - 1)).xyz);
             for (uint i = 0u; i < count; ++i) {
                 vec4 lobe = imageLoad(lobes, ivec3(x, y, lobe_layer + int(i)));
                 Placed placed = cluster_place(first, all, lobe.xyz, lobe.w, share * weights[i], kind);
@@ -40,18 +42,22 @@ void main() {
                 for (uint k = 0u; k < MOST_CLUSTERS; ++k) {
                     bool mine = k == placed.cluster;
                     firsts[k] += mine ? placed.first : vec4(0.0);
-                    seconds[k] += mine ? placed.second : vec2(0.0);
+                    seconds[k] += mine ? vec4(placed.second, normal * placed.first.x) : vec4(0.0);
                 }
             }
         }
     }
-    for (uint i = 0u; i < MOST_CLUSTERS; i += 2u) {
+    for (uint i = 0u; i < MOST_CLUSTERS; ++i) {
         if (i < all) {
             imageStore(cells, ivec3(p, cell_layer + int(i)), firsts[i]);
-            imageStore(cells, ivec3(p, cell_layer + int(all + i / 2u)), vec4(seconds[i], seconds[i + 1u]));
         }
-        if (i + 1u < all) {
-            imageStore(cells, ivec3(p, cell_layer + int(i) + 1), firsts[i + 1u]);
+        if (i < all && upright == 0u) {
+            imageStore(cells, ivec3(p, cell_layer + int(all + i)), seconds[i]);
+        }
+    }
+    for (uint i = 0u; i < MOST_CLUSTERS; i += 2u) {
+        if (i < all && upright != 0u) {
+            imageStore(cells, ivec3(p, cell_layer + int(all + i / 2u)), vec4(seconds[i].xy, seconds[i + 1u].xy));
         }
     }
 }

@@ -146,7 +146,7 @@ pub(crate) fn clusters(material: &Material, base: &Base, filter: Filter) -> Opti
         });
         effective::lobes(lobes.as_deref().unwrap_or(plain), normal, Rule::Exact)
     };
-    Some(Clusters::of(size, &texel))
+    Some(Clusters::of(size, !base.upright(), &texel))
 }
 
 /// The lobes at each place of a material, at each scale.
@@ -219,17 +219,11 @@ impl Moments {
             return FoundLobes { normal: DVec3::Z, lobes, normals, below, mass: None, facing, masking };
         }
         let by_cell = map.normals(&texel);
-        let normal = match (of_normals(), by_cell.is_empty()) {
+        let normal = match (of_normals(), by_cell.is_empty() || map.mass(&texel).is_some()) {
             (Some(normal), true) => normal,
             _ => direction(map, &texel),
         };
-        // A lobe of those that are about the normal stands on a normal of its own.
-        let own = self.normals.is_none();
-        let normals = match &lobes {
-            Mixture::Elliptic(lobes) if own => lobes.iter().map(|l| l.round.mu).collect(),
-            Mixture::Vmf(lobes) if own && map.mass(&texel).is_some() => lobes.iter().map(|l| l.mu).collect(),
-            _ => (0..lobes.count()).map(|i| by_cell.get(i).and_then(|n| n.try_normalize()).unwrap_or(normal)).collect(),
-        };
+        let normals = (0..lobes.count()).map(|i| by_cell.get(i).and_then(|n| n.try_normalize()).unwrap_or(normal)).collect();
         let below = map.concentrations_below(&texel, lobes.count());
         FoundLobes { normal, lobes, normals, below, mass: map.mass(&texel), facing, masking }
     }

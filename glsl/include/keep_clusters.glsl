@@ -17,10 +17,10 @@ void keep_ellipse(ivec2 p, inout Found f, Ellipse e, float mass, vec3 normal) {
 
 void decode_clusters(ivec2 p, MapRecord record, vec2 uv, Reach r, uint lobe_layer, inout Found f) {
     vec4 firsts[MOST_CLUSTERS];
-    vec2 seconds[MOST_CLUSTERS];
+    vec4 seconds[MOST_CLUSTERS]; // with the normal, if lobes are not about it
     for (uint i = 0u; i < MOST_CLUSTERS; ++i) {
         firsts[i] = vec4(0.0);
-        seconds[i] = vec2(0.0);
+        seconds[i] = vec4(0.0);
     }
     uint first = record.clusters.x, all = record.clusters.y;
     float coarse = min(r.level, 1.0), level = max(r.level - 1.0, 0.0);
@@ -30,9 +30,13 @@ void decode_clusters(ivec2 p, MapRecord record, vec2 uv, Reach r, uint lobe_laye
         // Layers beyond the material's own are another's.
         for (uint i = 0u; i < CLUSTERS; i += 2u) {
             firsts[i] += fetch(CELL_CLASSES, record.cells, i, at, level) * (i < all ? share : 0.0);
-            vec4 two = fetch(CELL_CLASSES, record.cells, all + i / 2u, at, level) * (i < all ? share : 0.0);
-            seconds[i] += two.xy;
-            seconds[i + 1u] += two.zw;
+            bool upright = record.upright != 0u;
+            vec4 two = fetch(CELL_CLASSES, record.cells, all + (upright ? i / 2u : i), at, level) * (i < all ? share : 0.0);
+            seconds[i] += upright ? vec4(two.xy, 0.0, 0.0) : two;
+            seconds[i + 1u].xy += upright ? two.zw : vec2(0.0);
+            for (uint k = i + 1u; k < (upright ? 0u : min(all, i + 2u)); ++k) {
+                seconds[i + 1u] += fetch(CELL_CLASSES, record.cells, all + k, at, level) * share;
+            }
             if (i + 1u < CLUSTERS) {
                 firsts[i + 1u] += fetch(CELL_CLASSES, record.cells, i + 1u, at, level) * (i + 1u < all ? share : 0.0);
             }
@@ -41,7 +45,10 @@ void decode_clusters(ivec2 p, MapRecord record, vec2 uv, Reach r, uint lobe_laye
         // Base texels, where they count.
         for (uint k = 0u; k < (coarse < 1.0 ? 4u : 0u); ++k) {
             vec2 corner = vec2(k & 1u, k >> 1), weight = mix(1.0 - part, part, corner);
-            vec2 centre = (corner_of + corner + 0.5) / r.size;
+            vec2 centre = (corner_of + corner + 0.5) / r.size, below = vec2(0.0);
+            for (uint j = record.upright; j < 1u; ++j) {
+                below = stereographic_of(fetch(MOMENT_CLASSES, record.moments, 0u, vec2(centre.x, 1.0 - centre.y), 0.0).xyz);
+            }
             for (uint j = 0u; j < record.count; ++j) {
                 vec4 lobe = fetch(MOMENT_CLASSES, record.moments, lobe_layer + j, vec2(centre.x, 1.0 - centre.y), 0.0);
                 float own = record.weights[j] * weight.x * weight.y * ((1.0 - coarse) / r.taps);
@@ -49,7 +56,7 @@ void decode_clusters(ivec2 p, MapRecord record, vec2 uv, Reach r, uint lobe_laye
                 for (uint i = 0u; i < MOST_CLUSTERS; ++i) {
                     bool mine = i == placed.cluster;
                     firsts[i] += mine ? placed.first : vec4(0.0);
-                    seconds[i] += mine ? placed.second : vec2(0.0);
+                    seconds[i] += mine ? vec4(placed.second, below * placed.first.x) : vec4(0.0);
                 }
             }
         }
@@ -61,8 +68,8 @@ void decode_clusters(ivec2 p, MapRecord record, vec2 uv, Reach r, uint lobe_laye
     for (uint i = 0u; i < CLUSTERS; ++i) {
         float q = i < all ? firsts[i].x : 0.0;
         if (q > LEAST_WEIGHT) {
-            Ellipse e = cluster_decode(clusters[first + i], firsts[i], seconds[i]);
-            keep_ellipse(p, f, e, q, record.upright != 0u ? e.mu : normal);
+            Ellipse e = cluster_decode(clusters[first + i], firsts[i], seconds[i].xy);
+            keep_ellipse(p, f, e, q, record.upright != 0u ? e.mu : stereographic_direction(seconds[i].zw / q));
             sum += e.mu * q;
             mass += q;
         }

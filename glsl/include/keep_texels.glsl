@@ -22,14 +22,22 @@ void decode_peaks(ivec2 p, MapRecord record, vec2 uv, Reach r, uint lobe_layer, 
             vec2 centre = (first + corner + 0.5) / size;
             centre.y = 1.0 - centre.y;
             float weight = share.x * share.y * of_level;
+            vec3 below = vec3(0.0);
+            for (uint j = record.upright; j < (base ? 1u : 0u); ++j) {
+                below = fetch(MOMENT_CLASSES, record.moments, 0u, centre, 0.0).xyz;
+            }
             for (uint j = 0u; j < (base ? record.count : 0u); ++j) {
                 vec4 lobe = fetch(MOMENT_CLASSES, record.moments, lobe_layer + j, centre, 0.0);
-                keep_mass(p, f, record, lobe.xyz, lobe.w, weight * record.weights[j] / moments_area(lobe.w, record.lobes), normal, sum);
+                keep_mass(p, f, record, lobe.xyz, lobe.w, weight * record.weights[j] / moments_area(lobe.w, record.lobes), below, sum);
             }
             for (uint j = 0u; j < (base ? 0u : filter_peaks(FILTER)); ++j) {
                 vec4 peak = fetch(CELL_CLASSES, record.cells, j, centre, level + float(side));
                 vec3 mu = oct_decode(peak.xy);
-                keep_mass(p, f, record, vec3(mu.xy, 1.0 - mu.z), peak.z, weight * peak.w, normal, sum);
+                for (uint k = record.upright; k < 1u; ++k) {
+                    vec3 n = oct_decode(fetch(CELL_CLASSES, record.cells, filter_peaks(FILTER) + j, centre, level + float(side)).xy);
+                    below = vec3(n.xy, 1.0 - n.z);
+                }
+                keep_mass(p, f, record, vec3(mu.xy, 1.0 - mu.z), peak.z, weight * peak.w, below, sum);
             }
         }
     }
@@ -59,10 +67,14 @@ void decode_base(ivec2 p, MapRecord record, vec2 uv, Reach r, uint lobe_layer, i
         vec2 texel = floor(fract((first + vec2(next) + clamp(inside, 0.0, 0.999999)) / size) * r.size);
         vec2 centre = (texel + 0.5) / r.size;
         centre.y = 1.0 - centre.y;
+        vec3 below = vec3(0.0);
+        for (uint j = record.upright; j < 1u; ++j) {
+            below = fetch(MOMENT_CLASSES, record.moments, 0u, centre, 0.0).xyz;
+        }
         for (uint j = 0u; j < record.count; ++j) {
             vec4 lobe = fetch(MOMENT_CLASSES, record.moments, lobe_layer + j, centre, 0.0);
             float weight = record.weights[j] / float(texels);
-            keep_mass(p, f, record, lobe.xyz, lobe.w, weight / moments_area(lobe.w, record.lobes), normal, sum);
+            keep_mass(p, f, record, lobe.xyz, lobe.w, weight / moments_area(lobe.w, record.lobes), below, sum);
         }
     }
     f.mean = record.upright != 0u ? sum.xyz / max(sum.w, LEAST_WEIGHT) : normal;

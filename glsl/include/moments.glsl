@@ -6,9 +6,11 @@
 //   vmf1:                                characteristic vector of all lobes; their mean spread
 //   clusters:                            of a base texel each lobe as naive has it; from level 1 on, in images of half the size and of
 //                                        numbers of 16 bits, the moments of each cluster, as clusters.glsl has them: mass, x, y, xx;
-//                                        then xy, yy of two clusters in a layer
+//                                        then xy, yy of two clusters in a layer, or, if lobes are not about the normal, of each with
+//                                        its normal
 //   fournier4, fournier7:                the same of a base texel; from level 1 on, in images of half the size, lobes of each texel:
-//                                        direction as oct.glsl has it, concentration, mass, which is 0 of none
+//                                        direction as oct.glsl has it, concentration, mass, which is 0 of none; then, if
+//                                        lobes are not about the normal, the normals of as many
 //   bruteforce:                          of a base texel each lobe as naive has it
 //   vmf4, vmf8, vmf:                     of a base texel each lobe as vmf1 has it; from level 1 on, in images of half the size,
 //                                        of each cell weight times characteristic vector (w x, w y, w - w z) and weight w; then

@@ -49,8 +49,8 @@ struct Block {
 }
 
 impl Clusters {
-    /// Those of a map of `size`.
-    pub(crate) fn of([width, height]: [u32; 2], texels: &Texels<'_>) -> Self {
+    /// Those of a map of `size`; with `normals` texels keep these, too.
+    pub(crate) fn of([width, height]: [u32; 2], normals: bool, texels: &Texels<'_>) -> Self {
         let all = width.saturating_mul(height);
         let at = |i: u32| match all <= TEXELS {
             true => i as usize,
@@ -62,27 +62,27 @@ impl Clusters {
         let lobes = (0..all.min(TEXELS)).flat_map(|i| texels(at(i)));
         let classes = classes(lobes.map(|l| Sample { placed: Placed::of(&l), weight: l.weight }).collect());
         let blocks = blocks([width, height], texels);
+        let most = Self::most(normals);
         let best = match classes.as_slice() {
-            [one] => (1..=MOST_CLUSTERS).map(|k| fit(one, k, &blocks)).collect(),
+            [one] => (1..=most).map(|k| fit(one, k, &blocks)).collect(),
             [rough, sharp] => {
-                let most = MOST_CLUSTERS - 1;
-                let [rough, sharp] = [rough, sharp].map(|class| (1..=most).map(|k| fit(class, k, &blocks)).collect::<Vec<_>>());
-                let pairs = (0..most).flat_map(|a| (0..most).map(move |b| (a, b))).filter(|(a, b)| a + b + 2 <= MOST_CLUSTERS);
+                let [rough, sharp] = [rough, sharp].map(|class| (1..most).map(|k| fit(class, k, &blocks)).collect::<Vec<_>>());
+                let pairs = (1..most).flat_map(|a| (1..most).map(move |b| (a - 1, b - 1))).filter(|(a, b)| a + b + 2 <= most);
                 pairs.map(|(a, b)| [rough[a].as_slice(), sharp[b].as_slice()].concat()).collect()
             }
             _ => Vec::new(),
         };
-        chosen(best, &blocks)
+        chosen(best, normals, &blocks)
     }
 }
 
 /// The fewest of `candidates` that are about as good as the best.
-fn chosen(candidates: Vec<Vec<Cluster>>, blocks: &[Block]) -> Clusters {
+fn chosen(candidates: Vec<Vec<Cluster>>, normals: bool, blocks: &[Block]) -> Clusters {
     let mut all: Vec<_> = candidates.into_iter().map(|c| (c.len(), error(&c, blocks), c)).collect();
     let least = all.iter().map(|c| c.1).fold(f64::INFINITY, f64::min);
     let enough = (least * AS_GOOD[0]).max(AS_GOOD[1]);
     all.sort_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
-    Clusters::new(all.into_iter().find(|c| c.1 <= enough).map(|c| c.2).unwrap_or_default())
+    Clusters::new(all.into_iter().find(|c| c.1 <= enough).map(|c| c.2).unwrap_or_default(), normals)
 }
 
 /// One class, or a rough one and a sharp one.
@@ -175,7 +175,7 @@ fn rounds(samples: &[Sample], mut clusters: Vec<Cluster>, by_density: bool) -> V
 }
 
 /// Half of the least variance of lobes in it is the least of what is decoded: between the samples lobes may be sharper.
-fn of_moments([q, x, y, xx, xy, yy]: [f64; MOMENTS], floor: f64, by_density: bool) -> Cluster {
+fn of_moments([q, x, y, xx, xy, yy, ..]: [f64; MOMENTS], floor: f64, by_density: bool) -> Cluster {
     let centre = DVec2::new(x, y) / q;
     let floor = 0.5 * floor;
     if !by_density {
@@ -244,17 +244,17 @@ impl Block {
 
 /// The relative L2 error of the density, in the mean over the sizes of blocks.
 fn error(clusters: &[Cluster], blocks: &[Block]) -> f64 {
-    let clusters = Clusters::new(clusters.to_vec());
+    let clusters = Clusters::new(clusters.to_vec(), false);
     let mut sums = [[0.0f64; 2]; SIDES.len()];
     for block in blocks {
         let mut texel = [0.0; MOMENTS * MOST_CLUSTERS];
         for lobe in &block.lobes {
-            let (i, moments) = clusters.encode(lobe, lobe.weight);
+            let (i, moments) = clusters.encode(lobe, None, lobe.weight);
             texel[i * MOMENTS..].iter_mut().zip(moments).for_each(|(sum, m)| *sum += m);
         }
         let (lobes, _) = clusters.decode(&texel);
         for (h, exact) in &block.half {
-            let found: f64 = lobes.iter().map(|l| l.density(*h)).sum();
+            let found: f64 = lobes.iter().map(|(l, _)| l.density(*h)).sum();
             let sum = &mut sums[block.size];
             *sum = [sum[0] + (found - exact).powi(2), sum[1] + exact * exact];
         }
@@ -275,7 +275,7 @@ mod tests {
         let flat = |_| lobe(0.2, -0.1, 90.0);
         let checker = |i: usize| lobe(0.0, 0.0, if (i / 4 + i / 256) % 2 == 0 { 24.0 } else { 768.0 });
         let facets = |i: usize| lobe(if i % 2 == 0 { 0.3 } else { -0.3 }, if i / 64 % 2 == 0 { 0.3 } else { -0.3 }, 900.0);
-        let of = |texels: &Texels<'_>| Clusters::of([64; 2], texels);
+        let of = |texels: &Texels<'_>| Clusters::of([64; 2], false, texels);
         assert_eq!([of(&flat), of(&checker), of(&facets)].map(|c| c.all().len()), [1, 2, 4]);
         let two = of(&checker);
         assert!(two.all()[0].bound == -two.all()[1].bound && two.all()[0].bound > 0.0, "{two:?}");
@@ -284,10 +284,10 @@ mod tests {
     #[test]
     fn the_same_map_has_the_same_clusters() {
         let waves = |i: usize| lobe(0.5 * (0.3 * i as f64).sin(), 0.5 * (0.041 * i as f64).cos(), 60.0);
-        let of = || Clusters::of([67, 45], &waves);
+        let of = || Clusters::of([67, 45], true, &waves);
         assert_eq!(of(), of());
         assert!(of().all().len() > 2 && of().bytes() <= 96);
         // One texel is enough.
-        assert_eq!(Clusters::of([1, 1], &waves).all().len(), 1);
+        assert_eq!(Clusters::of([1, 1], false, &waves).all().len(), 1);
     }
 }

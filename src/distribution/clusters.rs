@@ -10,11 +10,14 @@ use crate::distribution::vmf::Lobe;
 use glam::{DVec2, DVec3};
 
 /// Numbers of a cluster in a texel: mass; mass times place in the plane from the cluster's centre, x and y; mass times mean products
-/// xx, xy, yy of these, with the lobes' own variance.
-pub const MOMENTS: usize = 6;
+/// xx, xy, yy of these, with the lobes' own variance; mass times the place of the normal below, x and y, where lobes are not about it.
+pub const MOMENTS: usize = 8;
 
 /// The most clusters of a map: 96 bytes a texel in numbers of 16 bits.
 pub const MOST_CLUSTERS: usize = 8;
+
+/// The same with normals.
+pub const MOST_WITH_NORMALS: usize = 6;
 
 /// Lobes of less concentration count as this.
 const LEAST_CONCENTRATION: f64 = 0.25;
@@ -39,7 +42,11 @@ pub struct Cluster {
 
 /// Those of a map.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Clusters(Vec<Cluster>);
+pub struct Clusters {
+    all: Vec<Cluster>,
+    /// Whether lobes are not about the normals below, which are kept, too.
+    normals: bool,
+}
 
 /// A lobe in the plane.
 #[derive(Clone, Copy, Debug)]
@@ -83,11 +90,11 @@ impl Cluster {
     pub(crate) fn moments(&self, lobe: &Placed, q: f64) -> [f64; MOMENTS] {
         let d = lobe.at - self.centre;
         let v = lobe.variance;
-        [q, q * d.x, q * d.y, q * (d.x * d.x + v), q * d.x * d.y, q * (d.y * d.y + v)]
+        [q, q * d.x, q * d.y, q * (d.x * d.x + v), q * d.x * d.y, q * (d.y * d.y + v), 0.0, 0.0]
     }
 
     /// The lobe of these moments, of weight 1.
-    pub(crate) fn decode(&self, [q, x, y, xx, xy, yy]: [f64; MOMENTS]) -> elliptic::Lobe {
+    pub(crate) fn decode(&self, [q, x, y, xx, xy, yy, ..]: [f64; MOMENTS]) -> elliptic::Lobe {
         let off = DVec2::new(x, y) / q;
         let [xx, xy, yy] = [xx / q - off.x * off.x, xy / q - off.x * off.y, yy / q - off.y * off.y];
         let (mean, half) = (0.5 * (xx + yy), 0.5 * (xx - yy));
@@ -102,62 +109,74 @@ impl Cluster {
 }
 
 impl Clusters {
-    /// At least one, of which no more than [`MOST_CLUSTERS`] count.
-    pub(crate) fn new(mut all: Vec<Cluster>) -> Self {
-        all.truncate(MOST_CLUSTERS);
+    /// At least one, of which no more than [`Self::most`] count.
+    pub(crate) fn new(mut all: Vec<Cluster>, normals: bool) -> Self {
+        all.truncate(Self::most(normals));
         if all.is_empty() {
             all.push(Cluster { centre: DVec2::ZERO, inverse: [1.0, 0.0, 1.0], constant: 0.0, floor: 1e-9, bound: 0.0 });
         }
-        Self(all.into_iter().map(Cluster::rounded).collect())
+        Self { all: all.into_iter().map(Cluster::rounded).collect(), normals }
+    }
+
+    /// The most clusters with normals or without.
+    pub(crate) fn most(normals: bool) -> usize {
+        if normals { MOST_WITH_NORMALS } else { MOST_CLUSTERS }
     }
 
     /// They.
     pub fn all(&self) -> &[Cluster] {
-        &self.0
+        &self.all
     }
 
     /// Bytes of a texel, as it is stored.
     pub fn bytes(&self) -> usize {
-        layers(self.0.len()) * 8
+        layers(self.all.len(), self.normals) * 8
     }
 
     /// That of a lobe.
     pub(crate) fn nearest(&self, lobe: &Placed) -> usize {
-        let distances = self.0.iter().map(|cluster| cluster.distance(lobe));
+        let distances = self.all.iter().map(|cluster| cluster.distance(lobe));
         distances.enumerate().fold((0, f64::INFINITY), |best, (i, d)| if d < best.1 { (i, d) } else { best }).0
     }
 
-    /// What a lobe adds to a texel, and to which cluster.
-    pub(crate) fn encode(&self, lobe: &Lobe, q: f64) -> (usize, [f64; MOMENTS]) {
+    /// What a lobe over a normal adds to a texel, and to which cluster.
+    pub(crate) fn encode(&self, lobe: &Lobe, normal: Option<DVec3>, q: f64) -> (usize, [f64; MOMENTS]) {
         let placed = Placed::of(lobe);
         let i = self.nearest(&placed);
-        (i, self.0.get(i).map_or([0.0; MOMENTS], |cluster| cluster.moments(&placed, q)))
+        let mut moments = self.all.get(i).map_or([0.0; MOMENTS], |cluster| cluster.moments(&placed, q));
+        if let Some(normal) = normal.filter(|_| self.normals) {
+            let at = q * stereographic::of(normal);
+            (moments[6], moments[7]) = (at.x, at.y);
+        }
+        (i, moments)
     }
 
-    /// The lobes of a texel, of weights that sum to 1; and its mass.
-    pub(crate) fn decode(&self, texel: &[f64]) -> (Vec<elliptic::Lobe>, f64) {
+    /// The lobes of a texel, of weights that sum to 1, and the normals below them; and its mass.
+    pub(crate) fn decode(&self, texel: &[f64]) -> (Vec<(elliptic::Lobe, DVec3)>, f64) {
         let all = || texel.as_chunks::<MOMENTS>().0.iter();
         let mass: f64 = all().map(|m| m[0]).sum();
         let lobe = |(cluster, moments): (&Cluster, &[f64; MOMENTS])| {
             let lobe = cluster.decode(*moments);
             let round = Lobe { weight: moments[0] / mass, ..lobe.round };
-            (round.weight > LEAST_SHARE).then_some(elliptic::Lobe { round, ..lobe })
+            let below = stereographic::direction(DVec2::new(moments[6], moments[7]) / moments[0]);
+            let normal = if self.normals { below } else { round.mu };
+            (round.weight > LEAST_SHARE).then_some((elliptic::Lobe { round, ..lobe }, normal))
         };
-        (self.0.iter().zip(all()).filter_map(lobe).collect(), mass)
+        (self.all.iter().zip(all()).filter_map(lobe).collect(), mass)
     }
 
     /// A vector along the mean of the directions in a texel.
     pub(crate) fn mean_vector(&self, texel: &[f64]) -> DVec3 {
-        self.decode(texel).0.iter().map(|l| l.round.weight * l.round.mu).sum()
+        self.decode(texel).0.iter().map(|(l, _)| l.round.weight * l.round.mu).sum()
     }
 }
 
 /// Less of a texel's mass is none: that is what 16 bits round to.
 const LEAST_SHARE: f64 = 1e-6;
 
-/// Layers of four numbers: mass, x, y, xx of each cluster, then xy, yy of two clusters in a layer.
-pub(crate) fn layers(clusters: usize) -> usize {
-    clusters + clusters.div_ceil(2)
+/// Layers of four numbers: mass, x, y, xx of each cluster, then xy, yy of two clusters in a layer, or of each with its normal.
+pub(crate) fn layers(clusters: usize, normals: bool) -> usize {
+    clusters + if normals { clusters } else { clusters.div_ceil(2) }
 }
 
 #[cfg(test)]
@@ -166,13 +185,14 @@ mod tests {
 
     #[test]
     fn a_lobe_is_decoded_as_itself() {
-        let clusters = Clusters::new(Vec::new());
+        let clusters = Clusters::new(Vec::new(), false);
         for (mu, kappa) in [(DVec3::Z, 3e4), (DVec3::new(0.7, -0.5, 0.4), 12.0), (DVec3::new(-0.9, 0.1, -0.2), 300.0)] {
             let lobe = Lobe { mu: mu.normalize(), kappa, weight: 1.0 };
-            let (i, moments) = clusters.encode(&lobe, 1.3);
+            let (i, moments) = clusters.encode(&lobe, None, 1.3);
             let (lobes, mass) = clusters.decode(&moments);
             assert!(i == 0 && lobes.len() == 1 && (mass - 1.3).abs() < 1e-12);
-            let found = lobes[0];
+            let (found, normal) = lobes[0];
+            assert!(normal == found.round.mu);
             assert!((found.round.mu - lobe.mu).length() < 1e-12 && (found.round.kappa / kappa - 1.0).abs() < 1e-6, "{found:?}");
             assert!((found.ratio - 1.0).abs() < 1e-6 && (found.round.weight - 1.0).abs() < 1e-12);
         }
@@ -182,23 +202,28 @@ mod tests {
     fn lobes_go_to_the_clusters_of_their_roughness() {
         let at =
             |x: f64, bound| Cluster { centre: DVec2::new(x, 0.0), inverse: [1.0, 0.0, 1.0], constant: 0.0, floor: 0.0, bound };
-        let clusters = Clusters::new(vec![at(-0.5, 0.01), at(0.5, 0.01), at(0.0, -0.01)]);
-        let of = |x: f64, kappa| clusters.encode(&Lobe { mu: DVec3::new(x, 0.0, 1.0).normalize(), kappa, weight: 1.0 }, 1.0).0;
+        let clusters = Clusters::new(vec![at(-0.5, 0.01), at(0.5, 0.01), at(0.0, -0.01)], true);
+        let lobe = |x: f64, kappa| Lobe { mu: DVec3::new(x, 0.0, 1.0).normalize(), kappa, weight: 1.0 };
+        let of = |x, kappa| clusters.encode(&lobe(x, kappa), None, 1.0).0;
         assert_eq!([of(-0.1, 50.0), of(0.1, 50.0), of(0.9, 200.0)], [0, 1, 2]);
-        assert_eq!(clusters.bytes(), (3 + 2) * 8);
+        assert_eq!(clusters.bytes(), (3 + 3) * 8);
+        let below = DVec3::new(0.3, -0.2, 0.9).normalize();
+        let mut texel = [0.0; 3 * MOMENTS];
+        texel[..MOMENTS].copy_from_slice(&clusters.encode(&lobe(-0.1, 50.0), Some(below), 2.0).1);
+        assert!((clusters.decode(&texel).0[0].1 - below).length() < 1e-12);
     }
 
     #[test]
     fn two_lobes_make_an_ellipse() {
-        let clusters = Clusters::new(Vec::new());
+        let clusters = Clusters::new(Vec::new(), false);
         let mut texel = [0.0; MOMENTS];
         for x in [-0.1, 0.1] {
             let lobe = Lobe { mu: DVec3::new(0.6 * x, 0.8 * x, 1.0).normalize(), kappa: 1e4, weight: 0.5 };
-            texel.iter_mut().zip(clusters.encode(&lobe, 0.5).1).for_each(|(sum, m)| *sum += m);
+            texel.iter_mut().zip(clusters.encode(&lobe, None, 0.5).1).for_each(|(sum, m)| *sum += m);
         }
         let (lobes, _) = clusters.decode(&texel);
-        assert!(lobes[0].axis.dot(DVec3::new(0.6, 0.8, 0.0)).abs() > 0.999_999, "{lobes:?}");
-        assert!((lobes[0].ratio.powi(2) / 101.0 - 1.0).abs() < 0.02, "{lobes:?}");
+        assert!(lobes[0].0.axis.dot(DVec3::new(0.6, 0.8, 0.0)).abs() > 0.999_999, "{lobes:?}");
+        assert!((lobes[0].0.ratio.powi(2) / 101.0 - 1.0).abs() < 0.02, "{lobes:?}");
         assert!((clusters.mean_vector(&texel) - DVec3::Z).length() < 1e-6);
     }
 }

@@ -23,8 +23,10 @@ const DIVISIONS: usize = 2;
 /// How much greater than its lobes' own spread a cell's spread may be before it is divided.
 const SPREAD_RATIO: f64 = 1.5;
 
-/// Numbers of a texel for each lobe of directions, or each that is kept: weight times mean direction, times concentration, and weight.
+/// Numbers of a texel for each lobe of directions: weight times mean direction, times concentration, and weight.
 const DIRECTION: usize = 5;
+/// Numbers of a lobe that is kept as it is: mass times direction, times concentration, mass; mass times the normal below.
+const KEPT: usize = 8;
 /// For each lobe of slopes: weight times mean slope and mean products xx, xy, yy, and weight.
 const SLOPE: usize = 6;
 /// For each cell: weight times characteristic vector, weight, weight times the mean length of the characteristic vectors, and weight
@@ -110,7 +112,8 @@ impl<'a> Filtered<'a> {
     /// 8 and 9) and its tests of length (Algorithm 1, with the weights of equation 15, without which energy would grow with the
     /// number of cells). `None` for a filter that stores nothing.
     pub fn new(filter: Filter, map: &'a BrdfMap, literal: bool) -> Option<Self> {
-        let clusters = filter.is_elliptic().then(|| Clusters::of(map.size(), &|i| map.texel(i).to_vec()));
+        let clusters =
+            filter.is_elliptic().then(|| Clusters::of(map.size(), map.normal(0).is_some(), &|i| map.texel(i).to_vec()));
         Self::over(filter, Cow::Borrowed(map), literal, clusters, |kappa| vmf::mean_cosine(kappa).max(LEAST_PROJECTED_AREA))
     }
 
@@ -138,7 +141,7 @@ impl<'a> Filtered<'a> {
         let (slots, stride) = storage.layout(map.lobes_per_texel());
         let channels = if let Kept::Clusters(clusters) = &kept { clusters.all().len() * MOMENTS } else { slots * stride };
         let mips = Mips::new(map.size(), channels, |i, out| match &kept {
-            Kept::Clusters(clusters) => encode_clusters(clusters, map.texel(i), area, out),
+            Kept::Clusters(clusters) => encode_clusters(clusters, map.texel(i), map.normal(i), area, out),
             _ => encode(storage, map.texel(i), map.normal(i), literal, out),
         });
         let division = if literal { Division::PRINTED } else { Division::default() };
@@ -167,14 +170,14 @@ impl<'a> Filtered<'a> {
             Kept::Base => return self.below(level, i),
             Kept::Peaks(peaks) if level > 0 => {
                 let texel = peaks.texel(level, i);
-                let there = texel.iter().filter(|l| l.weight > 0.0);
-                return (!texel.is_empty()).then(|| there.flat_map(|l| kept(l, l.weight)).collect());
+                let there = texel.iter().filter(|p| p.lobe.weight > 0.0);
+                return (!texel.is_empty()).then(|| there.flat_map(|p| kept(&p.lobe, p.normal, p.lobe.weight)).collect());
             }
             _ if level > 0 => return self.mips.texel(level, i).map(<[f64]>::to_vec),
             Kept::Peaks(_) => return self.below(0, i),
             Kept::Clusters(clusters) => {
                 let mut out = vec![0.0; clusters.all().len() * MOMENTS];
-                encode_clusters(clusters, lobes, self.area, &mut out);
+                encode_clusters(clusters, lobes, self.map.normal(i), self.area, &mut out);
                 return (!lobes.is_empty()).then_some(out);
             }
             Kept::Nothing => {}
@@ -192,8 +195,10 @@ impl<'a> Filtered<'a> {
         let mut all = Vec::new();
         for (row, of_row) in covered(y, size[1], from[1]) {
             for (column, of_column) in covered(x, size[0], from[0]) {
-                let texel = self.map.texel(row * from[0] as usize + column);
-                all.extend(texel.iter().flat_map(|l| kept(l, of_row * of_column * l.weight / (self.area)(l.kappa))));
+                let texel = row * from[0] as usize + column;
+                let normal = |l: &Lobe| self.map.normal(texel).unwrap_or(l.mu);
+                let mass = |l: &Lobe| of_row * of_column * l.weight / (self.area)(l.kappa);
+                all.extend(self.map.texel(texel).iter().flat_map(|l| kept(l, normal(l), mass(l))));
             }
         }
         (level < self.levels() && y < size[1] as usize).then_some(all)
@@ -228,16 +233,19 @@ impl<'a> Filtered<'a> {
             Storage::Directions { .. } => Mixture::Vmf(texel.as_chunks().0.iter().filter_map(|t| self.direction(*t)).collect()),
             Storage::Slopes { .. } => Mixture::Slopes(texel.as_chunks().0.iter().filter_map(|t| gaussian(*t)).collect()),
             Storage::Cells(_) => Mixture::Vmf(self.cells(texel).into_iter().map(|(lobe, _)| lobe).collect()),
-            Storage::Clusters => Mixture::Elliptic(self.clusters(texel).map_or_else(Vec::new, |found| found.0)),
+            Storage::Clusters => {
+                let found = self.clusters(texel).map_or_else(Vec::new, |found| found.0);
+                Mixture::Elliptic(found.into_iter().map(|(lobe, _)| lobe).collect())
+            }
             Storage::Peaks(_) | Storage::Base => {
                 let mass = self.mass(texel).unwrap_or(1.0);
-                Mixture::Vmf(texel.as_chunks().0.iter().filter_map(|t| lobe_kept(*t, mass)).collect())
+                Mixture::Vmf(texel.as_chunks().0.iter().filter_map(|t| lobe_kept(*t, mass)).map(|(lobe, _)| lobe).collect())
             }
         }
     }
 
     /// The lobes of clusters and their mass.
-    fn clusters(&self, texel: &[f64]) -> Option<(Vec<elliptic::Lobe>, f64)> {
+    fn clusters(&self, texel: &[f64]) -> Option<(Vec<(elliptic::Lobe, DVec3)>, f64)> {
         if let Kept::Clusters(clusters) = &self.kept { Some(clusters.decode(texel)) } else { None }
     }
 
@@ -251,16 +259,20 @@ impl<'a> Filtered<'a> {
     pub fn mass(&self, texel: &[f64]) -> Option<f64> {
         match self.storage {
             Storage::Clusters => self.clusters(texel).map(|found| found.1),
-            Storage::Peaks(_) | Storage::Base => Some(texel.as_chunks().0.iter().map(|t: &[f64; DIRECTION]| t[4]).sum()),
+            Storage::Peaks(_) | Storage::Base => Some(texel.as_chunks().0.iter().map(|t: &[f64; KEPT]| t[4]).sum()),
             Storage::Directions { .. } | Storage::Slopes { .. } | Storage::Cells(_) => None,
         }
     }
 
-    /// The normals below each lobe of [`Self::decode`], of any length above 0; none where lobes are not by cells.
+    /// The normals below each lobe of [`Self::decode`], of any length above 0; none where lobes share theirs.
     pub fn normals(&self, texel: &[f64]) -> Vec<DVec3> {
         match self.storage {
             Storage::Cells(_) => self.cells(texel).into_iter().map(|(_, normal)| normal).collect(),
-            _ => Vec::new(),
+            Storage::Clusters => self.clusters(texel).map_or_else(Vec::new, |f| f.0.into_iter().map(|(_, n)| n).collect()),
+            Storage::Peaks(_) | Storage::Base => {
+                texel.as_chunks().0.iter().filter_map(|t| lobe_kept(*t, 1.0)).map(|(_, normal)| normal).collect()
+            }
+            Storage::Directions { .. } | Storage::Slopes { .. } => Vec::new(),
         }
     }
 
@@ -300,7 +312,7 @@ impl<'a> Filtered<'a> {
             Storage::Slopes { .. } => DVec3::Z,
             Storage::Clusters => self.clusters_of_map().map_or(DVec3::Z, |clusters| clusters.mean_vector(texel)),
             Storage::Peaks(_) | Storage::Base => {
-                texel.as_chunks().0.iter().map(|t: &[f64; DIRECTION]| DVec3::new(t[0], t[1], t[2])).sum()
+                texel.as_chunks().0.iter().map(|t: &[f64; KEPT]| DVec3::new(t[5], t[6], t[7])).sum()
             }
         }
     }
@@ -404,19 +416,20 @@ fn covered(i: usize, size: u32, from: u32) -> impl Iterator<Item = (usize, f64)>
 }
 
 /// A lobe with the mass `q`.
-fn kept(l: &Lobe, q: f64) -> [f64; DIRECTION] {
-    [q * l.mu.x, q * l.mu.y, q * l.mu.z, q * l.kappa, q]
+fn kept(l: &Lobe, normal: DVec3, q: f64) -> [f64; KEPT] {
+    let n = q * normal.normalize_or(DVec3::Z);
+    [q * l.mu.x, q * l.mu.y, q * l.mu.z, q * l.kappa, q, n.x, n.y, n.z]
 }
 
-fn lobe_kept([x, y, z, kappa, q]: [f64; DIRECTION], mass: f64) -> Option<Lobe> {
+fn lobe_kept([x, y, z, kappa, q, nx, ny, nz]: [f64; KEPT], mass: f64) -> Option<(Lobe, DVec3)> {
     let mu = DVec3::new(x, y, z).try_normalize().unwrap_or(DVec3::Z);
-    (q > 0.0).then(|| Lobe { mu, kappa: kappa / q, weight: q / mass })
+    (q > 0.0).then(|| (Lobe { mu, kappa: kappa / q, weight: q / mass }, DVec3::new(nx, ny, nz)))
 }
 
-fn encode_clusters(clusters: &Clusters, lobes: &[Lobe], area: Area, out: &mut [f64]) {
+fn encode_clusters(clusters: &Clusters, lobes: &[Lobe], normal: Option<DVec3>, area: Area, out: &mut [f64]) {
     out.fill(0.0);
     for lobe in lobes {
-        let (i, moments) = clusters.encode(lobe, lobe.weight / area(lobe.kappa));
+        let (i, moments) = clusters.encode(lobe, normal, lobe.weight / area(lobe.kappa));
         out[i * MOMENTS..].iter_mut().zip(moments).for_each(|(sum, m)| *sum += m);
     }
 }

@@ -9,21 +9,34 @@ use glam::DVec3;
 /// Rounds of a fit.
 const ROUNDS: usize = 6;
 
-const NONE: Lobe = Lobe { mu: DVec3::Z, kappa: 1.0, weight: 0.0 };
+const NONE: Peak = Peak { lobe: Lobe { mu: DVec3::Z, kappa: 1.0, weight: 0.0 }, normal: DVec3::Z };
+
+/// A lobe whose weight is its mass, and the mean of the normals below it, of any length above 0.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Peak {
+    /// Of weight 0 if there is none.
+    pub lobe: Lobe,
+    /// Its own direction, if lobes are about their normals.
+    pub normal: DVec3,
+}
 
 /// The peaks of the texels of a map's mips.
 #[derive(Clone, Debug)]
 pub struct Peaks {
     count: usize,
     /// From level 1 on, texel by texel, of weight 0 where fewer are enough. Weights are masses.
-    levels: Vec<Vec<Lobe>>,
+    levels: Vec<Vec<Peak>>,
 }
 
 impl Peaks {
     /// `count` peaks a texel, from the lobes of a map with the masses weight over `area` of concentration.
     pub fn of(map: &BrdfMap, count: usize, area: fn(f64) -> f64) -> Self {
-        let own = |i: usize| map.texel(i).iter().map(|l| Lobe { weight: l.weight / area(l.kappa), ..*l }).collect::<Vec<_>>();
-        let (mut levels, mut size): (Vec<Vec<Lobe>>, _) = (Vec::new(), map.size());
+        let peak = |i: usize, l: &Lobe| Peak {
+            lobe: Lobe { weight: l.weight / area(l.kappa), ..*l },
+            normal: map.normal(i).unwrap_or(l.mu),
+        };
+        let own = |i: usize| map.texel(i).iter().map(|l| peak(i, l)).collect::<Vec<_>>();
+        let (mut levels, mut size): (Vec<Vec<Peak>>, _) = (Vec::new(), map.size());
         while size != [1, 1] {
             let next = halved(size);
             let mut texels = Vec::with_capacity(next[0] as usize * next[1] as usize * count);
@@ -31,13 +44,13 @@ impl Peaks {
             for_each_cover(size, next, |_, covered| {
                 below.clear();
                 for (from, share) in covered {
-                    let scaled = |l: &Lobe| Lobe { weight: l.weight * share, ..*l };
+                    let scaled = |p: &Peak| Peak { lobe: Lobe { weight: p.lobe.weight * share, ..p.lobe }, ..*p };
                     match levels.last() {
                         None => below.extend(own(*from).iter().map(scaled)),
                         Some(level) => below.extend(level[from * count..(from + 1) * count].iter().map(scaled)),
                     }
                 }
-                below.retain(|l| l.weight > 0.0);
+                below.retain(|p: &Peak| p.lobe.weight > 0.0);
                 fit(&mut below, count);
                 texels.extend(below.iter().copied().chain(std::iter::repeat(NONE)).take(count));
             });
@@ -48,13 +61,13 @@ impl Peaks {
     }
 
     /// Of texel `i` of a level above 0; none where there is none.
-    pub fn texel(&self, level: usize, i: usize) -> &[Lobe] {
+    pub fn texel(&self, level: usize, i: usize) -> &[Peak] {
         let level = level.checked_sub(1).and_then(|l| self.levels.get(l));
         level.and_then(|l| l.get(i * self.count..(i + 1) * self.count)).unwrap_or_default()
     }
 
     /// All of a level above 0, texel by texel.
-    pub fn level(&self, level: usize) -> &[Lobe] {
+    pub fn level(&self, level: usize) -> &[Peak] {
         level.checked_sub(1).and_then(|l| self.levels.get(l)).map_or(&[], Vec::as_slice)
     }
 }
@@ -66,10 +79,11 @@ fn distance(a: &Lobe, b: &Lobe) -> f64 {
 }
 
 /// Replaces lobes by at most `count`, each with the mean vector of those nearest to it.
-fn fit(lobes: &mut Vec<Lobe>, count: usize) {
-    if lobes.len() <= count {
+fn fit(all: &mut Vec<Peak>, count: usize) {
+    if all.len() <= count {
         return;
     }
+    let lobes: Vec<Lobe> = all.iter().map(|p| p.lobe).collect();
     // The heaviest, then always that which is the farthest from all, by its weight.
     let farthest = |peaks: &[Lobe]| {
         let far = |l: &Lobe| l.weight * peaks.iter().map(|p| distance(l, p)).fold(1e9, f64::min);
@@ -102,28 +116,25 @@ fn fit(lobes: &mut Vec<Lobe>, count: usize) {
             }
         }
     }
-    for (i, peak) in peaks.iter_mut().enumerate() {
-        let (mut sum, mut lost, mut weight, mut count) = (DVec3::ZERO, 0.0, 0.0, 0);
-        for l in lobes.iter().zip(&assigned).filter(|(_, a)| **a == i).map(|(l, _)| l) {
-            sum += l.weight * l.mu;
-            lost += l.weight * vmf::spread(l.kappa);
-            weight += l.weight;
-            count += 1;
-            if count == 1 {
-                *peak = *l;
-            }
+    let merged = |(i, peak): (usize, &Lobe)| {
+        let (mut sum, mut normal, mut lost, mut weight) = (DVec3::ZERO, DVec3::ZERO, 0.0, 0.0);
+        let mut own = all.iter().zip(&assigned).filter(|(_, a)| **a == i).map(|(p, _)| p).inspect(|p| {
+            sum += p.lobe.weight * p.lobe.mu;
+            normal += p.lobe.weight * p.normal.normalize_or(DVec3::Z);
+            lost += p.lobe.weight * vmf::spread(p.lobe.kappa);
+            weight += p.lobe.weight;
+        });
+        let first = own.next();
+        if own.count() == 0 {
+            return first.copied();
         }
-        if count > 1 {
-            // 1 - |r| of the mean vector, from the spread of directions and the lobes' own, of which neither cancels.
-            let apart = 1.0 - sum.length() / weight;
-            let kappa = vmf::concentration(apart + (1.0 - apart) * lost / weight);
-            *peak = Lobe { mu: sum.try_normalize().unwrap_or(peak.mu), kappa, weight };
-        } else if count == 0 {
-            *peak = NONE;
-        }
-    }
-    lobes.clear();
-    lobes.extend(peaks.into_iter().filter(|p| p.weight > 0.0));
+        // 1 - |r| of the mean vector, from the spread of directions and the lobes' own, of which neither cancels.
+        let apart = 1.0 - sum.length() / weight;
+        let kappa = vmf::concentration(apart + (1.0 - apart) * lost / weight);
+        Some(Peak { lobe: Lobe { mu: sum.try_normalize().unwrap_or(peak.mu), kappa, weight }, normal })
+    };
+    let found: Vec<Peak> = peaks.iter().enumerate().filter_map(merged).collect();
+    *all = found;
 }
 
 #[cfg(test)]
@@ -138,7 +149,7 @@ mod tests {
         let peaks = Peaks::of(&map, 4, |_| 0.5);
         for level in 1..=4 {
             for i in 0..(16 >> level) * (16 >> level) {
-                let texel: Vec<_> = peaks.texel(level, i).iter().filter(|l| l.weight > 0.0).collect();
+                let texel: Vec<_> = peaks.texel(level, i).iter().map(|p| p.lobe).filter(|l| l.weight > 0.0).collect();
                 // Level 1 has as many as there are below.
                 assert!(texel.len() == if level == 1 { 4 } else { 3 }, "{level} {i}: {texel:?}");
                 assert!((texel.iter().map(|l| l.weight).sum::<f64>() - 2.0).abs() < 1e-9);

@@ -102,8 +102,9 @@ impl Layers {
             Some(Storage::Clusters | Storage::Peaks(_) | Storage::Base) => (false, 1, 0),
         };
         let cells = match filter.storage() {
-            Some(Storage::Clusters) => clusters::layers(clusters as usize),
-            Some(Storage::Peaks(peaks)) => peaks,
+            Some(Storage::Clusters) => clusters::layers(clusters as usize, !base.upright()),
+            // With normals in layers behind all.
+            Some(Storage::Peaks(peaks)) => peaks * if base.upright() { 1 } else { 2 },
             // With their spreads, four in a layer, and the normals below lobes that are about other directions.
             _ => cells + cells / 4 + if base.upright() { 0 } else { cells },
         };

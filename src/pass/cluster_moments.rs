@@ -50,6 +50,7 @@ struct Push {
     kind: u32,
     first: u32,
     all: u32,
+    upright: u32,
 }
 
 /// Mirrors `Cluster` in `glsl/include/clusters.glsl`.
@@ -179,6 +180,7 @@ impl Push {
             kind: brdf_map::lobes(!base.is_empty(), source.parameter),
             first: source.clusters[0],
             all: source.clusters[1],
+            upright: u32::from(source.base.upright()),
         }
     }
 }

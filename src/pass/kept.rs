@@ -60,11 +60,12 @@ fn same_maps(a: &Material, b: &Material) -> bool {
 }
 
 /// The texels of an image of peaks, level by level, in layers as many as are in `desc`: of the `sources`, materials with the first of
-/// their layers, `count` peaks each, over maps of `size`.
+/// their layers, `count` peaks each and, where lobes are not about them, as many normals, over maps of `size`.
 pub(crate) fn peaks(desc: &ImageDesc, size: [u32; 2], count: usize, sources: &[(&Material, usize)]) -> Vec<u8> {
     let of = |(material, first): &(&Material, usize)| {
         let map = BrdfMap::of(material, size, Rule::Exact).ok()?;
-        Some((Peaks::of(&map, count, Parameter::of(&material.model).area()), *first))
+        let normals = map.normal(0).is_some();
+        Some((Peaks::of(&map, count, Parameter::of(&material.model).area()), *first, normals))
     };
     let all: Vec<_> = sources.iter().filter_map(of).collect();
     let mut texels: Vec<[f32; 4]> = Vec::new();
@@ -74,11 +75,15 @@ pub(crate) fn peaks(desc: &ImageDesc, size: [u32; 2], count: usize, sources: &[(
         let start = texels.len();
         texels.resize(start + area * desc.layers.unwrap_or(1) as usize, [0.0; 4]);
         let layers = &mut texels[start..];
-        for (peaks, first) in &all {
-            for (i, lobe) in peaks.level(level as usize + 1).iter().enumerate() {
-                let at = octahedron(lobe.mu);
-                if let Some(texel) = layers.get_mut((first + i % count) * area + i / count) {
+        for (peaks, first, normals) in &all {
+            for (i, peak) in peaks.level(level as usize + 1).iter().enumerate() {
+                let (at, below, lobe) = (octahedron(peak.lobe.mu), octahedron(peak.normal), &peak.lobe);
+                let texel = |layer: usize| (first + layer) * area + i / count;
+                if let Some(texel) = layers.get_mut(texel(i % count)) {
                     *texel = [at.x, at.y, lobe.kappa, lobe.weight].map(|v| v as f32);
+                }
+                if let Some(texel) = layers.get_mut(texel(count + i % count)).filter(|_| *normals) {
+                    *texel = [below.x, below.y, 0.0, 0.0].map(|v| v as f32);
                 }
             }
         }
