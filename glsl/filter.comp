@@ -89,7 +89,7 @@ void keep(ivec2 p, inout Found f, vec3 mu, float kappa, float weight, vec3 norma
     float share = weight * moments_area(kappa, f.lobes) / f.area;
     vec3 below = f.frame * moments_direction(normal), x, y;
     tangent_basis(world, x, y);
-    uvec4 lobe = FILTER == FILTER_CLUSTERS ? found_pack_along(world, x, 1.0, below, kappa, share) : found_pack(world, below, kappa, share);
+    uvec4 lobe = FILTER == FILTER_CLUSTERS ? found_pack_along(world, x, 1.0, 1.0, below, kappa, share) : found_pack(world, below, kappa, share);
     imageStore(lobes, ivec3(p, int(f.count)), lobe);
     f.count += 1u;
     f.sharpest = weight > MATTERS ? max(f.sharpest, kappa) : f.sharpest;

@@ -210,13 +210,22 @@ impl Moments {
         let Some(map) = &self.lobes else {
             let normal = of_normals().unwrap_or(DVec3::Z);
             let (normals, below) = (Vec::new(), Vec::new());
-            return FoundLobes { normal, lobes: Mixture::Vmf(Vec::new()), normals, below, mass: None, facing, masking };
+            return FoundLobes {
+                normal,
+                lobes: Mixture::Vmf(Vec::new()),
+                normals,
+                below,
+                mass: None,
+                own: Vec::new(),
+                facing,
+                masking,
+            };
         };
         let texel = mean(map);
         let lobes = map.decode(&texel);
         if let Mixture::Slopes(_) = &lobes {
             let (normals, below) = (Vec::new(), Vec::new());
-            return FoundLobes { normal: DVec3::Z, lobes, normals, below, mass: None, facing, masking };
+            return FoundLobes { normal: DVec3::Z, lobes, normals, below, mass: None, own: Vec::new(), facing, masking };
         }
         let by_cell = map.normals(&texel);
         let normal = match (of_normals(), by_cell.is_empty() || map.mass(&texel).is_some()) {
@@ -225,7 +234,8 @@ impl Moments {
         };
         let normals = (0..lobes.count()).map(|i| by_cell.get(i).and_then(|n| n.try_normalize()).unwrap_or(normal)).collect();
         let below = map.concentrations_below(&texel, lobes.count());
-        FoundLobes { normal, lobes, normals, below, mass: map.mass(&texel), facing, masking }
+        let (mass, own) = (map.mass(&texel), map.own_concentrations(&texel));
+        FoundLobes { normal, lobes, normals, below, mass, own, facing, masking }
     }
 }
 

@@ -15,6 +15,7 @@ const float CLUSTER_OUTSIDE = 1e6;
 struct Cluster {
     vec4 at;    // centre; constant; the least variance of a lobe
     vec4 shape; // the inverse matrix of distances: xx, xy, yy; which variances of lobes it takes
+    vec4 own;   // the mean of these
 };
 layout(set = 2, binding = CLUSTERS_BINDING, std430) readonly buffer Clusters {
     Cluster clusters[];

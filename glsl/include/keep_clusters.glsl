@@ -1,7 +1,8 @@
 // The lobes of clusters of what a pixel covers: between base texels, which have their lobes as they are, and the levels of moments.
 // Part of filter.comp.
 
-void keep_ellipse(ivec2 p, inout Found f, Ellipse e, float mass, vec3 normal) {
+// `own` is 1 / kappa of the lobes below: what is wider than that is the spread of their normals.
+void keep_ellipse(ivec2 p, inout Found f, Ellipse e, float mass, float own, vec3 normal) {
     if (f.count >= LOBES) {
         return;
     }
@@ -10,7 +11,8 @@ void keep_ellipse(ivec2 p, inout Found f, Ellipse e, float mass, vec3 normal) {
     across /= 1.0 + 0.5 * across * f.kernel;
     float kappa = sqrt(along * across), share = mass * moments_area(kappa, f.lobes) / f.area;
     vec3 mu = f.frame * moments_direction(e.mu), below = f.frame * moments_direction(normal);
-    imageStore(lobes, ivec3(p, int(f.count)), found_pack_along(mu, f.frame * e.axis, sqrt(across / along), below, kappa, share));
+    uvec4 lobe = found_pack_along(mu, f.frame * e.axis, sqrt(across / along), 1.0 / max(own * across, 1e-12), below, kappa, share);
+    imageStore(lobes, ivec3(p, int(f.count)), lobe);
     f.count += 1u;
     f.sharpest = share > MATTERS ? max(f.sharpest, across) : f.sharpest;
 }
@@ -68,8 +70,9 @@ void decode_clusters(ivec2 p, MapRecord record, vec2 uv, Reach r, uint lobe_laye
     for (uint i = 0u; i < CLUSTERS; ++i) {
         float q = i < all ? firsts[i].x : 0.0;
         if (q > LEAST_WEIGHT) {
-            Ellipse e = cluster_decode(clusters[first + i], firsts[i], seconds[i].xy);
-            keep_ellipse(p, f, e, q, record.upright != 0u ? e.mu : stereographic_direction(seconds[i].zw / q));
+            Cluster c = clusters[first + i];
+            Ellipse e = cluster_decode(c, firsts[i], seconds[i].xy);
+            keep_ellipse(p, f, e, q, c.own.x, record.upright != 0u ? e.mu : stereographic_direction(seconds[i].zw / q));
             sum += e.mu * q;
             mass += q;
         }

@@ -30,6 +30,10 @@ vec3 lobe_normal[LAYERS];
 // Elliptic: the axis and the direction across, divided by the width there over that of a round lobe.
 vec3 lobe_along[LAYERS];
 vec3 lobe_across[LAYERS];
+// How far normals follow the half vector: factors on its parts along both, and along the axis, of 1.
+vec3 lobe_follow[LAYERS];
+// What turns the lobe's direction to the normal: the axis times the sine, the cosine.
+vec4 lobe_turn[LAYERS];
 
 // The sample's lobes, with those.
 struct Lobes {
@@ -81,7 +85,8 @@ Lobes lobes_load(ivec2 p, Local f, Material m) {
                 break;
             }
             vec3 centre = ELLIPTIC != 0u ? found_direction_along(found) : found_direction(found);
-            vec3 mu = centre * mat3(f.x, f.y, f.z), normal = found_normal(found) * mat3(f.x, f.y, f.z);
+            vec3 below = ELLIPTIC != 0u ? found_normal_along(found) : found_normal(found);
+            vec3 mu = centre * mat3(f.x, f.y, f.z), normal = below * mat3(f.x, f.y, f.z);
             float kappa = found_concentration(found), spread = vmf_spread(kappa), height = vmf_normalisation(kappa);
             float a = ggx ? clamp(2.0 / kappa, 1e-6, 1.0) : (cosine ? max(1.0 / spread - 2.0, 0.0) : kappa);
             float peak = ggx ? a * INV_PI : (cosine ? blinn_phong_peak(a) : height / max(1.0 - spread, LEAST_PROJECTED_AREA));
@@ -96,6 +101,9 @@ Lobes lobes_load(ivec2 p, Local f, Material m) {
                 vec3 along = (x * axis.x + y * axis.y) * mat3(f.x, f.y, f.z);
                 lobe_along[i] = along / stretch;
                 lobe_across[i] = cross(mu, along) * stretch;
+                float ratio = stretch * stretch, across = 1.0 / found_narrower(found), follow = 1.0 - across / (ratio * ratio);
+                lobe_follow[i] = vec3(follow * ratio, (1.0 - across) / ratio, follow);
+                lobe_turn[i] = vec4(cross(mu, normal), dot(mu, normal));
             }
             l.count += 1u;
         }
@@ -169,19 +177,26 @@ vec4 lobes_evaluate(Material m, Lobes l, vec3 wi, vec3 wo, vec3 h) {
             vec3 d = h - axis.xyz;
             float square = dot(d, d), ch = 1.0 - 0.5 * square, sine = square * (1.0 - 0.25 * square);
             vec3 normal = lobe_normal[i];
-            float ci = dot(normal, wi), co = axis.w;
-            bool lit = ci > 0.0;
-            ci = lit ? ci : 1.0;
+            float mean = max(dot(normal, wi), 0.0), co = axis.w;
             float stretched = sine, factor = 1.0, power = shape.x, whole = 1.0;
             if (ELLIPTIC != 0u) {
-                // Towards the half vector the concentration is `factor` times as large.
                 float along = dot(d, lobe_along[i]), over = dot(d, lobe_across[i]);
+                // The normal of the places whose lobes are at the half vector, turned as the mean one is from the lobe's direction.
+                vec3 follow = lobe_follow[i], at = axis.xyz * (1.0 - follow.z * (0.5 * square));
+                at = normalize(at + lobe_along[i] * (along * follow.x) + lobe_across[i] * (over * follow.y));
+                vec4 turn = lobe_turn[i];
+                normal = at * turn.w + cross(turn.xyz, at) + turn.xyz * (dot(turn.xyz, at) / max(1.0 + turn.w, 1e-3));
+                co = max(dot(normal, wo), FACING);
+                // Towards the half vector the concentration is `factor` times as large.
                 stretched = along * along + over * over;
                 factor = sine > 0.0 ? stretched / sine : 1.0;
                 power = max(factor * (shape.x + 2.0) - 2.0, 0.0);
                 whole = (1.0 - exp(-2.0 * shape.x)) / max(1.0 - exp(-2.0 * shape.x * factor), 1e-30);
                 whole = ggx || cosine || shape.x < 1e-3 ? 1.0 : whole;
             }
+            float ci = dot(normal, wi);
+            bool lit = ci > 0.0;
+            ci = lit ? ci : 1.0;
             float q = shape.x * ch * ch + stretched;
             float exponent = cosine ? 0.5 * power * log_complement(min(sine, 1.0)) : -0.5 * shape.x * factor * square;
             float normals = shape.y * whole * (ggx ? 1.0 / (q * q) : exp(exponent));
@@ -190,7 +205,7 @@ vec4 lobes_evaluate(Material m, Lobes l, vec3 wi, vec3 wo, vec3 h) {
                              : min(0.25 / (ci * co), 0.5 * max(dot(normal, h), 0.0) / (across * max(ci, co)));
             float lit_weight = lit ? shape.z * ci : 0.0;
             specular += normals * open * lit_weight;
-            diffuse += lit_weight;
+            diffuse += shape.z * mean;
             density += shape.z * (ggx || cosine ? normals * ch : shape.w * whole * exp(exponent));
             weights += shape.z;
         }

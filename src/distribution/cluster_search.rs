@@ -126,7 +126,7 @@ fn fit(class: &Class, k: usize, blocks: &[Block]) -> Vec<Cluster> {
 }
 
 fn round(centre: DVec2) -> Cluster {
-    Cluster { centre, inverse: [1.0, 0.0, 1.0], constant: 0.0, floor: 0.0, bound: 0.0 }
+    Cluster { centre, inverse: [1.0, 0.0, 1.0], constant: 0.0, floor: 0.0, own: 0.0, bound: 0.0 }
 }
 
 /// Samples far from each other (Arthur and Vassilvitskii 2007, "k-means++").
@@ -155,6 +155,7 @@ fn rounds(samples: &[Sample], mut clusters: Vec<Cluster>, by_density: bool) -> V
     let mut assigned = vec![usize::MAX; samples.len()];
     for _ in 0..ROUNDS {
         let (mut sums, mut floors) = (vec![[0.0; MOMENTS]; clusters.len()], vec![f64::INFINITY; clusters.len()]);
+        let mut owns = vec![0.0; clusters.len()];
         let mut changed = false;
         for (s, assigned) in samples.iter().zip(&mut assigned) {
             let placed = Placed { own: 1.0, ..s.placed };
@@ -164,9 +165,14 @@ fn rounds(samples: &[Sample], mut clusters: Vec<Cluster>, by_density: bool) -> V
             let moments = round(DVec2::ZERO).moments(&s.placed, s.weight);
             sums[nearest].iter_mut().zip(moments).for_each(|(sum, m)| *sum += m);
             floors[nearest] = floors[nearest].min(s.placed.variance);
+            owns[nearest] += s.weight * s.placed.own;
         }
-        let there = sums.iter().zip(floors).filter(|(sum, _)| sum[0] > 0.0);
-        clusters = there.map(|(sum, floor)| of_moments(*sum, floor, by_density)).collect();
+        let there = sums.iter().zip(floors).zip(owns).filter(|((sum, _), _)| sum[0] > 0.0);
+        let cluster = |((sum, floor), own): ((&[f64; MOMENTS], f64), f64)| Cluster {
+            own: own / sum[0],
+            ..of_moments(*sum, floor, by_density)
+        };
+        clusters = there.map(cluster).collect();
         if !changed {
             break;
         }
@@ -187,7 +193,7 @@ fn of_moments([q, x, y, xx, xy, yy, ..]: [f64; MOMENTS], floor: f64, by_density:
     let xy = (xy / q - centre.x * centre.y).clamp(-most, most);
     let determinant = xx * yy - xy * xy;
     let inverse = [yy / determinant, -xy / determinant, xx / determinant];
-    Cluster { centre, inverse, constant: determinant.ln() - 2.0 * q.ln(), floor, bound: 0.0 }
+    Cluster { inverse, constant: determinant.ln() - 2.0 * q.ln(), floor, ..round(centre) }
 }
 
 /// Blocks spread over the map.
@@ -254,7 +260,7 @@ fn error(clusters: &[Cluster], blocks: &[Block]) -> f64 {
         }
         let (lobes, _) = clusters.decode(&texel);
         for (h, exact) in &block.half {
-            let found: f64 = lobes.iter().map(|(l, _)| l.density(*h)).sum();
+            let found: f64 = lobes.iter().map(|l| l.lobe.density(*h)).sum();
             let sum = &mut sums[block.size];
             *sum = [sum[0] + (found - exact).powi(2), sum[1] + exact * exact];
         }

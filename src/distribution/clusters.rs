@@ -36,6 +36,8 @@ pub struct Cluster {
     pub constant: f64,
     /// The least variance that a lobe decoded from it has in the plane.
     pub floor: f64,
+    /// The mean of 1 / kappa of its lobes.
+    pub own: f64,
     /// It takes lobes of at least this variance 1 / kappa, if that is 0 or more; else of less than its opposite.
     pub bound: f64,
 }
@@ -46,6 +48,17 @@ pub struct Clusters {
     all: Vec<Cluster>,
     /// Whether lobes are not about the normals below, which are kept, too.
     normals: bool,
+}
+
+/// A lobe that is decoded.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Decoded {
+    /// Of the share of the texel's mass that it has.
+    pub lobe: elliptic::Lobe,
+    /// The mean of the normals below, unit.
+    pub normal: DVec3,
+    /// The concentration of the lobes below: what is wider than that is the spread of their normals.
+    pub own: f64,
 }
 
 /// A lobe in the plane.
@@ -75,6 +88,7 @@ impl Cluster {
             inverse: self.inverse.map(round),
             constant: round(self.constant),
             floor: round(self.floor),
+            own: round(self.own),
             bound: round(self.bound),
         }
     }
@@ -113,7 +127,7 @@ impl Clusters {
     pub(crate) fn new(mut all: Vec<Cluster>, normals: bool) -> Self {
         all.truncate(Self::most(normals));
         if all.is_empty() {
-            all.push(Cluster { centre: DVec2::ZERO, inverse: [1.0, 0.0, 1.0], constant: 0.0, floor: 1e-9, bound: 0.0 });
+            all.push(Cluster { centre: DVec2::ZERO, inverse: [1.0, 0.0, 1.0], constant: 0.0, floor: 1e-9, own: 0.0, bound: 0.0 });
         }
         Self { all: all.into_iter().map(Cluster::rounded).collect(), normals }
     }
@@ -151,8 +165,8 @@ impl Clusters {
         (i, moments)
     }
 
-    /// The lobes of a texel, of weights that sum to 1, and the normals below them; and its mass.
-    pub(crate) fn decode(&self, texel: &[f64]) -> (Vec<(elliptic::Lobe, DVec3)>, f64) {
+    /// The lobes of a texel, of weights that sum to 1; and its mass.
+    pub(crate) fn decode(&self, texel: &[f64]) -> (Vec<Decoded>, f64) {
         let all = || texel.as_chunks::<MOMENTS>().0.iter();
         let mass: f64 = all().map(|m| m[0]).sum();
         let lobe = |(cluster, moments): (&Cluster, &[f64; MOMENTS])| {
@@ -160,14 +174,15 @@ impl Clusters {
             let round = Lobe { weight: moments[0] / mass, ..lobe.round };
             let below = stereographic::direction(DVec2::new(moments[6], moments[7]) / moments[0]);
             let normal = if self.normals { below } else { round.mu };
-            (round.weight > LEAST_SHARE).then_some((elliptic::Lobe { round, ..lobe }, normal))
+            let (lobe, own) = (elliptic::Lobe { round, ..lobe }, 1.0 / cluster.own.max(1e-30));
+            (round.weight > LEAST_SHARE).then_some(Decoded { lobe, normal, own })
         };
         (self.all.iter().zip(all()).filter_map(lobe).collect(), mass)
     }
 
     /// A vector along the mean of the directions in a texel.
     pub(crate) fn mean_vector(&self, texel: &[f64]) -> DVec3 {
-        self.decode(texel).0.iter().map(|(l, _)| l.round.weight * l.round.mu).sum()
+        self.decode(texel).0.iter().map(|l| l.lobe.round.weight * l.lobe.round.mu).sum()
     }
 }
 
@@ -191,7 +206,7 @@ mod tests {
             let (i, moments) = clusters.encode(&lobe, None, 1.3);
             let (lobes, mass) = clusters.decode(&moments);
             assert!(i == 0 && lobes.len() == 1 && (mass - 1.3).abs() < 1e-12);
-            let (found, normal) = lobes[0];
+            let Decoded { lobe: found, normal, .. } = lobes[0];
             assert!(normal == found.round.mu);
             assert!((found.round.mu - lobe.mu).length() < 1e-12 && (found.round.kappa / kappa - 1.0).abs() < 1e-6, "{found:?}");
             assert!((found.ratio - 1.0).abs() < 1e-6 && (found.round.weight - 1.0).abs() < 1e-12);
@@ -200,8 +215,14 @@ mod tests {
 
     #[test]
     fn lobes_go_to_the_clusters_of_their_roughness() {
-        let at =
-            |x: f64, bound| Cluster { centre: DVec2::new(x, 0.0), inverse: [1.0, 0.0, 1.0], constant: 0.0, floor: 0.0, bound };
+        let at = |x: f64, bound| Cluster {
+            centre: DVec2::new(x, 0.0),
+            inverse: [1.0, 0.0, 1.0],
+            constant: 0.0,
+            floor: 0.0,
+            own: 0.0,
+            bound,
+        };
         let clusters = Clusters::new(vec![at(-0.5, 0.01), at(0.5, 0.01), at(0.0, -0.01)], true);
         let lobe = |x: f64, kappa| Lobe { mu: DVec3::new(x, 0.0, 1.0).normalize(), kappa, weight: 1.0 };
         let of = |x, kappa| clusters.encode(&lobe(x, kappa), None, 1.0).0;
@@ -210,7 +231,7 @@ mod tests {
         let below = DVec3::new(0.3, -0.2, 0.9).normalize();
         let mut texel = [0.0; 3 * MOMENTS];
         texel[..MOMENTS].copy_from_slice(&clusters.encode(&lobe(-0.1, 50.0), Some(below), 2.0).1);
-        assert!((clusters.decode(&texel).0[0].1 - below).length() < 1e-12);
+        assert!((clusters.decode(&texel).0[0].normal - below).length() < 1e-12);
     }
 
     #[test]
@@ -222,8 +243,8 @@ mod tests {
             texel.iter_mut().zip(clusters.encode(&lobe, None, 0.5).1).for_each(|(sum, m)| *sum += m);
         }
         let (lobes, _) = clusters.decode(&texel);
-        assert!(lobes[0].0.axis.dot(DVec3::new(0.6, 0.8, 0.0)).abs() > 0.999_999, "{lobes:?}");
-        assert!((lobes[0].0.ratio.powi(2) / 101.0 - 1.0).abs() < 0.02, "{lobes:?}");
+        assert!(lobes[0].lobe.axis.dot(DVec3::new(0.6, 0.8, 0.0)).abs() > 0.999_999, "{lobes:?}");
+        assert!((lobes[0].lobe.ratio.powi(2) / 101.0 - 1.0).abs() < 0.02, "{lobes:?}");
         assert!((clusters.mean_vector(&texel) - DVec3::Z).length() < 1e-6);
     }
 }

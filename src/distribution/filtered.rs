@@ -1,8 +1,7 @@
 //! A map as a filter stores it: what a lobe adds to a texel, of which mips are averages, and the lobes that a texel decodes to.
 
 use crate::distribution::brdf_map::BrdfMap;
-use crate::distribution::clusters::{Clusters, MOMENTS};
-use crate::distribution::elliptic;
+use crate::distribution::clusters::{Clusters, Decoded, MOMENTS};
 use crate::distribution::filter::{Division, Filter, Storage};
 use crate::distribution::literal;
 use crate::distribution::mip::Mips;
@@ -235,7 +234,7 @@ impl<'a> Filtered<'a> {
             Storage::Cells(_) => Mixture::Vmf(self.cells(texel).into_iter().map(|(lobe, _)| lobe).collect()),
             Storage::Clusters => {
                 let found = self.clusters(texel).map_or_else(Vec::new, |found| found.0);
-                Mixture::Elliptic(found.into_iter().map(|(lobe, _)| lobe).collect())
+                Mixture::Elliptic(found.into_iter().map(|found| found.lobe).collect())
             }
             Storage::Peaks(_) | Storage::Base => {
                 let mass = self.mass(texel).unwrap_or(1.0);
@@ -245,8 +244,14 @@ impl<'a> Filtered<'a> {
     }
 
     /// The lobes of clusters and their mass.
-    fn clusters(&self, texel: &[f64]) -> Option<(Vec<(elliptic::Lobe, DVec3)>, f64)> {
+    fn clusters(&self, texel: &[f64]) -> Option<(Vec<Decoded>, f64)> {
         if let Kept::Clusters(clusters) = &self.kept { Some(clusters.decode(texel)) } else { None }
+    }
+
+    /// The concentrations below each of the lobes of [`Self::decode`] beside which the rest of their widths is the spread of
+    /// normals; none where lobes do not say it.
+    pub fn own_concentrations(&self, texel: &[f64]) -> Vec<f64> {
+        self.clusters(texel).map_or_else(Vec::new, |found| found.0.iter().map(|l| l.own).collect())
     }
 
     /// Those of the map, if the filter has some.
@@ -268,7 +273,7 @@ impl<'a> Filtered<'a> {
     pub fn normals(&self, texel: &[f64]) -> Vec<DVec3> {
         match self.storage {
             Storage::Cells(_) => self.cells(texel).into_iter().map(|(_, normal)| normal).collect(),
-            Storage::Clusters => self.clusters(texel).map_or_else(Vec::new, |f| f.0.into_iter().map(|(_, n)| n).collect()),
+            Storage::Clusters => self.clusters(texel).map_or_else(Vec::new, |f| f.0.iter().map(|l| l.normal).collect()),
             Storage::Peaks(_) | Storage::Base => {
                 texel.as_chunks().0.iter().filter_map(|t| lobe_kept(*t, 1.0)).map(|(_, normal)| normal).collect()
             }

@@ -31,6 +31,9 @@ pub struct FoundLobes {
     pub below: Vec<f64>,
     /// What the lobes below integrate to over solid angle, of one direction each, if it is known.
     pub mass: Option<f64>,
+    /// The concentrations of the lobes below each, beside which the rest of its width is the spread of their normals: towards a half
+    /// vector the normal is that of the places whose lobes are there. None where normals stay the mean ones.
+    pub own: Vec<f64>,
     /// The mean cosine of the directions of a place's lobes to its normal.
     pub facing: f64,
     /// How they are masked, if they are slopes.
@@ -59,13 +62,38 @@ fn mean_cosine(model: &Model, kappa: f64) -> f64 {
     }
 }
 
+/// A lobe and the normal below it.
+#[derive(Clone, Debug)]
+struct Facet {
+    lobe: elliptic::Lobe,
+    /// The mean.
+    normal: DVec3,
+    /// How far the normals follow the half vector along the axis and across, of 1.
+    follows: [f64; 2],
+}
+
+impl Facet {
+    /// The normal of the places whose lobes are at `h`: turned as the mean normal is from the lobe's direction.
+    fn normal_at(&self, h: DVec3) -> DVec3 {
+        let [along, across] = self.follows;
+        if along <= 0.0 {
+            return self.normal;
+        }
+        let (mu, axis) = (self.lobe.round.mu, self.lobe.axis);
+        let (off, other) = (h - mu, mu.cross(axis));
+        let part = mu * (1.0 - along * 0.5 * off.length_squared());
+        let at = (part + axis * (along * off.dot(axis)) + other * (across * off.dot(other))).normalize_or(mu);
+        let (turn, cosine) = (mu.cross(self.normal), mu.dot(self.normal));
+        at * cosine + turn.cross(at) + turn * (turn.dot(at) / (1.0 + cosine).max(1e-3))
+    }
+}
+
 /// A model with the lobes that were found in the place of its own, in the frame about the shading normal.
 #[derive(Clone, Debug)]
 pub struct Surface {
     /// With the colours of its maps.
     model: Model,
-    /// With their normals.
-    facets: Vec<(elliptic::Lobe, DVec3)>,
+    facets: Vec<Facet>,
     /// In their place.
     slopes: Option<Mixture>,
     masking: Masking,
@@ -82,11 +110,12 @@ impl Surface {
         let of = |i: usize| found.mass.map_or_else(|| found.below.get(i).map_or(1.0, |kappa| area(*kappa)), |mass| 1.0 / mass);
         let turned = |(i, l): (usize, elliptic::Lobe)| {
             let weight = l.round.weight * area(l.round.kappa) / (found.facing * of(i));
-            let normal = found.normals.get(i).copied().unwrap_or(found.normal);
-            (
-                elliptic::Lobe { round: Lobe { mu: frame * l.round.mu, weight, ..l.round }, axis: frame * l.axis, ..l },
-                frame * normal,
-            )
+            let normal = frame * found.normals.get(i).copied().unwrap_or(found.normal);
+            let follows = found.own.get(i).map_or([0.0; 2], |own| {
+                [l.round.kappa / l.ratio, l.round.kappa * l.ratio].map(|kappa| (1.0 - kappa / own).max(0.0))
+            });
+            let round = Lobe { mu: frame * l.round.mu, weight, ..l.round };
+            Facet { lobe: elliptic::Lobe { round, axis: frame * l.axis, ..l }, normal, follows }
         };
         let (facets, slopes) = match &found.lobes {
             Mixture::Vmf(lobes) => (lobes.iter().map(|l| (*l).into()).enumerate().map(turned).collect(), None),
@@ -153,9 +182,11 @@ impl Reflectance for Surface {
             (slopes.specular(wi, wo, self.masking), lit / wi.z)
         } else {
             let (mut specular, mut lit, mut weights) = (0.0, 0.0, 0.0);
-            for (lobe, normal) in &self.facets {
-                let round = &lobe.round;
+            for facet in &self.facets {
+                let Facet { lobe, normal: mean, .. } = facet;
+                let (round, normal) = (&lobe.round, facet.normal_at(h));
                 weights += round.weight;
+                lit += round.weight * mean.dot(wi).max(0.0);
                 let ci = normal.dot(wi);
                 if ci <= 0.0 {
                     continue;
@@ -163,7 +194,6 @@ impl Reflectance for Surface {
                 let cosines = [ci, normal.dot(wo).max(FACING), normal.dot(h)];
                 let square = (h - round.mu).length_squared();
                 specular += round.weight * ci * self.facet(round.kappa, lobe.factor(h), cosines, square, across);
-                lit += round.weight * ci;
             }
             (specular / wi.z, lit / wi.z / f64::max(weights, f64::MIN_POSITIVE))
         };

@@ -59,13 +59,15 @@ struct Push {
 pub(crate) struct Record {
     at: [f32; 4],
     shape: [f32; 4],
+    own: [f32; 4],
 }
 
 impl From<&Cluster> for Record {
     fn from(c: &Cluster) -> Self {
         let [xx, xy, yy] = c.inverse;
         let [at, shape] = [[c.centre.x, c.centre.y, c.constant, c.floor], [xx, xy, yy, c.bound]];
-        Self { at: at.map(|v| v as f32), shape: shape.map(|v| v as f32) }
+        let own = [c.own as f32, 0.0, 0.0, 0.0];
+        Self { at: at.map(|v| v as f32), shape: shape.map(|v| v as f32), own }
     }
 }
 
