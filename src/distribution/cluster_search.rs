@@ -227,7 +227,7 @@ fn half_vectors(lobes: &[Lobe], number: u32) -> Vec<(DVec3, f64)> {
     let half = |j: u32| {
         let [a, b] = sobol::point(j, sobol::hash(number)).map(sobol::to_unit);
         let drawn = sobol::to_unit(sobol::random(j, number)[0]) * lobes.len() as f64;
-        let h = lobes.get(drawn as usize).filter(|_| j % 4 != 0).unwrap_or(&any).sample([a, b]);
+        let h = lobes.get(drawn as usize).filter(|_| !j.is_multiple_of(4)).unwrap_or(&any).sample([a, b]);
         (h, exact(h))
     };
     (0..HALF_VECTORS).map(half).collect()
@@ -279,8 +279,9 @@ mod tests {
     #[test]
     fn there_are_as_many_as_the_map_asks_for() {
         let flat = |_| lobe(0.2, -0.1, 90.0);
-        let checker = |i: usize| lobe(0.0, 0.0, if (i / 4 + i / 256) % 2 == 0 { 24.0 } else { 768.0 });
-        let facets = |i: usize| lobe(if i % 2 == 0 { 0.3 } else { -0.3 }, if i / 64 % 2 == 0 { 0.3 } else { -0.3 }, 900.0);
+        let checker = |i: usize| lobe(0.0, 0.0, if (i / 4 + i / 256).is_multiple_of(2) { 24.0 } else { 768.0 });
+        let side = |i: usize| if i.is_multiple_of(2) { 0.3 } else { -0.3 };
+        let facets = |i: usize| lobe(side(i), side(i / 64), 900.0);
         let of = |texels: &Texels<'_>| Clusters::of([64; 2], false, texels);
         assert_eq!([of(&flat), of(&checker), of(&facets)].map(|c| c.all().len()), [1, 2, 4]);
         let two = of(&checker);

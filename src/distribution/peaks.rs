@@ -6,6 +6,9 @@ use crate::distribution::vmf::{self, Lobe};
 use crate::texture::{for_each_cover, halved};
 use glam::DVec3;
 
+/// Lobes no further apart than this, by weight, are one: what rounding leaves.
+const SAME: f64 = 1e-12;
+
 /// Rounds of a fit.
 const ROUNDS: usize = 6;
 
@@ -87,7 +90,7 @@ fn fit(all: &mut Vec<Peak>, count: usize) {
     // The heaviest, then always that which is the farthest from all, by its weight.
     let farthest = |peaks: &[Lobe]| {
         let far = |l: &Lobe| l.weight * peaks.iter().map(|p| distance(l, p)).fold(1e9, f64::min);
-        lobes.iter().map(|l| (far(l), *l)).fold((0.0, None), |best, (d, l)| if d > best.0 { (d, Some(l)) } else { best }).1
+        lobes.iter().map(|l| (far(l), *l)).fold((SAME, None), |best, (d, l)| if d > best.0 { (d, Some(l)) } else { best }).1
     };
     let mut peaks: Vec<Lobe> = Vec::with_capacity(count);
     while let Some(next) = farthest(&peaks).filter(|_| peaks.len() < count) {

@@ -204,8 +204,8 @@ fn groups(
     reading: &Reading<'_>,
 ) -> (Vec<Group>, Vec<Option<GroupPlace>>) {
     let mut groups: Vec<_> = sizes.into_iter().map(Group::new).collect();
-    let mut place = |(((material, base), slots), clusters): (((&Material, &Option<Base>), &Slots), &[u32; 2])| {
-        let base = (*base)?;
+    let mut place = |i: usize| {
+        let (material, base, slots, clusters) = (materials.get(i)?, (*bases.get(i)?)?, slots.get(i)?, clusters.get(i)?);
         let group = brdf_map::fitting(&groups, base.size(material))?;
         let roughness = base.roughness(material).and(slots.roughness);
         let parameter = Parameter::of(&material.model);
@@ -214,7 +214,7 @@ fn groups(
         let cells = if reading.bins == Bins::Camera { 0 } else { layers.cells };
         Some(GroupPlace { group, first: groups.get_mut(group)?.place(source, Layers { cells, ..layers }), layers })
     };
-    let places = materials.iter().zip(bases).zip(slots).zip(clusters).map(&mut place).collect();
+    let places = (0..materials.len()).map(&mut place).collect();
     (groups, places)
 }
 
