@@ -23,7 +23,7 @@ layout(constant_id = 1) const bool LOCAL_LIGHTS = false;
 // Where the filter finds lobes: whether there are materials beside, which stay as they are.
 layout(constant_id = 10) const uint UNFILTERED = 1u;
 // Whether no lobe is sharper than the sharpest level, beyond which the map is looked up.
-layout(constant_id = 13) const uint EXACT = 0u;
+layout(constant_id = 14) const uint EXACT = 0u;
 #include "approximation.glsl"
 
 layout(set = 2, binding = 1) uniform sampler2D normals;  // as the filter pass writes them

@@ -12,6 +12,9 @@
 #include "roughness.glsl"
 #include "look_up.glsl"
 #include "geometric.glsl"
+#include "sobol.glsl"
+#define CLUSTERS_BINDING 14
+#include "clusters.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
 
@@ -35,6 +38,8 @@ layout(constant_id = 12) const float LENGTH_OF_ONE = 0.0;
 layout(constant_id = 13) const float LENGTH_OF_QUARTERS = 0.0;
 // Whether cells are in camera space, each object's own.
 layout(constant_id = 14) const bool CAMERA = false;
+// The most clusters that a material has.
+layout(constant_id = 15) const uint CLUSTERS = 1u;
 
 struct MapRecord {
     uvec4 places;        // albedo, specular, normal, roughness: 0 for none, else (layer << 3 | class) + 1
@@ -49,6 +54,7 @@ struct MapRecord {
     uint upright;        // whether all are about the normal
     float concentration; // of the one lobe of a material without maps of normals and roughness
     float facing;        // mean cosine of the lobes' directions to the normal
+    uvec4 clusters;      // the first, and how many there are
 };
 layout(set = 2, binding = 1, std430) readonly buffer Maps {
     MapRecord maps[]; // by material
@@ -81,7 +87,10 @@ void keep(ivec2 p, inout Found f, vec3 mu, float kappa, float weight, vec3 norma
     kappa /= 1.0 + 0.5 * kappa * f.kernel;
     vec3 world = f.frame * moments_direction(mu);
     float share = weight * moments_area(kappa, f.lobes) / f.area;
-    imageStore(lobes, ivec3(p, int(f.count)), found_pack(world, f.frame * moments_direction(normal), kappa, share));
+    vec3 below = f.frame * moments_direction(normal), x, y;
+    tangent_basis(world, x, y);
+    uvec4 lobe = FILTER == FILTER_CLUSTERS ? found_pack_along(world, x, 1.0, 1.0, below, kappa, share) : found_pack(world, below, kappa, share);
+    imageStore(lobes, ivec3(p, int(f.count)), lobe);
     f.count += 1u;
     f.sharpest = weight > MATTERS ? max(f.sharpest, kappa) : f.sharpest;
 }
@@ -201,6 +210,9 @@ void gather(MapRecord record, uint code, mat3 turn, vec2 uv, Reach r, uint lobe_
     }
 }
 
+#include "keep_clusters.glsl"
+#include "keep_texels.glsl"
+
 // Stores the lobes of a material with moments.
 void decode(ivec2 p, MapRecord record, vec2 uv, vec4 footprint, inout Found f) {
     Reach r = reach_of(MOMENT_CLASSES, record.moments, footprint);
@@ -240,6 +252,12 @@ void decode(ivec2 p, MapRecord record, vec2 uv, vec4 footprint, inout Found f) {
                 keep_cell(p, f, cells[i], 1.0);
             }
         }
+    } else if (FILTER == FILTER_CLUSTERS) {
+        decode_clusters(p, record, uv, r, layer, f);
+    } else if (filter_peaks(FILTER) != 0u) {
+        decode_peaks(p, record, uv, r, layer, f);
+    } else if (FILTER == FILTER_BRUTE_FORCE) {
+        decode_base(p, record, uv, r, layer, f);
     } else {
         uint count = filter_merges(FILTER) ? min(record.count, 1u) : record.count;
         vec3 normal = record.upright != 0u ? vec3(0.0) : look_up(MOMENT_CLASSES, record.moments, 0u, uv, r).xyz;

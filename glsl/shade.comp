@@ -42,12 +42,12 @@ layout(constant_id = 5) const bool ALLOCATED = false;
 layout(constant_id = 10) const uint UNFILTERED = 1u;
 #include "approximation.glsl"
 // The most lobes that stand for a material, and whether what is left is stored as a factor on what they reflect.
-layout(constant_id = 13) const uint APPROXIMATING = 1u;
-layout(constant_id = 14) const uint RATIO = 0u;
+layout(constant_id = 14) const uint APPROXIMATING = 1u;
+layout(constant_id = 15) const uint RATIO = 0u;
 // Whether lobes are taken to be just what look-ups of them hold.
-layout(constant_id = 15) const uint EXACT = 0u;
+layout(constant_id = 16) const uint EXACT = 0u;
 // Whether directions are drawn from the reflectance alone.
-layout(constant_id = 16) const uint ALONE = 0u;
+layout(constant_id = 17) const uint ALONE = 0u;
 
 layout(set = 2, binding = 3, std430) readonly buffer Arguments {
     uint groups_x, groups_y, groups_z;

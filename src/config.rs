@@ -320,6 +320,8 @@ impl Config {
         check(ascending, "residual_errors", "three finite numbers in ascending order", format!("{:?}", self.residual_errors))?;
         check((1..=256).contains(&self.probes), "probes", "1 to 256", self.probes.to_string())?;
         check((1..=16).contains(&self.anisotropy), "anisotropy", "1 to 16", self.anisotropy.to_string())?;
+        let texels = matches!(self.filter, Filter::Fournier4 | Filter::Fournier7);
+        check(!texels || self.anisotropy == 1, "anisotropy", "1 with fournier4 and fournier7", self.anisotropy.to_string())?;
         if self.bins == Bins::Camera {
             let expected = "tangent, unless the filter is vmf4, vmf8 or vmf";
             check(self.filter.has_cells(), "bins", expected, format!("camera with {}", self.filter.name()))?;

@@ -245,9 +245,9 @@ impl Reach {
     }
 
     /// Where the look-ups are taken about `uv`.
-    pub fn places(&self, uv: DVec2) -> impl Iterator<Item = DVec2> {
+    pub fn places(&self, uv: DVec2) -> impl ExactSizeIterator<Item = DVec2> {
         let (axis, taps) = (self.axis, f64::from(self.taps));
-        (0..self.taps).map(move |i| uv + axis * ((f64::from(i) + 0.5) / taps - 0.5))
+        (0..self.taps as usize).map(move |i| uv + axis * ((i as f64 + 0.5) / taps - 0.5))
     }
 }
 

@@ -2,10 +2,12 @@
 //! `vmf_mips` and of what `filter` decodes.
 
 use crate::distribution::brdf_map::UPRIGHT;
-use crate::distribution::effective::{self, Rule};
+use crate::distribution::effective::{self, Rule, ggx_mean_cosine};
+use crate::distribution::filtered::Area;
 use crate::distribution::surface::FoundLobes;
-use crate::distribution::{BrdfMap, Division, Filter, Filtered, MOST_BASE_LOBES, Mixture};
-use crate::material::{LEAST_ALPHA, Maps, Material, Reach};
+use crate::distribution::{BrdfMap, Clusters, Division, Filter, Filtered, MOST_BASE_LOBES, Mixture, vmf};
+use crate::material::{LEAST_ALPHA, Maps, Material, Reach, unit};
+use crate::reflectance::vmf::LEAST_PROJECTED_AREA;
 use crate::reflectance::{Ggx, Lobe, Model};
 use crate::texture::Texture;
 use glam::{DVec2, DVec3};
@@ -107,6 +109,14 @@ impl Base {
 }
 
 impl Parameter {
+    /// The mean cosine over solid angle of a lobe of some concentration about its direction.
+    pub fn area(self) -> Area {
+        match self {
+            Self::Ggx => |kappa| ggx_mean_cosine((2.0 / kappa).sqrt().clamp(LEAST_ALPHA, 1.0)),
+            Self::Alpha | Self::Exponent => |kappa| vmf::mean_cosine(kappa).max(LEAST_PROJECTED_AREA),
+        }
+    }
+
     /// Of a model's lobes.
     pub fn of(model: &Model) -> Self {
         match model {
@@ -115,6 +125,28 @@ impl Parameter {
             Model::Table(_) | Model::Turned(_) | Model::Vmf(_) => Self::Alpha,
         }
     }
+}
+
+/// The clusters of a material of which `base` is filtered by `filter`, if that has some.
+pub(crate) fn clusters(material: &Material, base: &Base, filter: Filter) -> Option<Clusters> {
+    let plain = base.lobes();
+    if !filter.is_elliptic() || plain.is_empty() {
+        return None;
+    }
+    let size = base.size(material);
+    let texel = |i: usize| {
+        let [w, h] = size.map(f64::from);
+        let (x, y) = ((i % size[0] as usize) as f64, (i / size[0] as usize) as f64);
+        let uv = DVec2::new((x + 0.5) / w, 1.0 - (y + 0.5) / h);
+        let normal = material.maps.normal.as_ref().map_or(DVec3::Z, |map| unit(map.sample(uv, 0.0).truncate().truncate()));
+        let roughness = base.roughness(material).zip(material.maps.roughness.as_ref());
+        let lobes = roughness.and_then(|(map, (_, kind))| {
+            let value = material.model.roughness_from(*kind, map.sample(uv, 0.0).x);
+            effective::base(&material.model, Some(value), Rule::Exact)
+        });
+        effective::lobes(lobes.as_deref().unwrap_or(plain), normal, Rule::Exact)
+    };
+    Some(Clusters::of(size, !base.upright(), &texel))
 }
 
 /// The lobes at each place of a material, at each scale.
@@ -140,7 +172,8 @@ impl Moments {
         let base = Base::of(material, rule)?;
         let size = base.size(material);
         let keep = |material: &Material, filter, rule| {
-            Some(Filtered::keeping(filter, BrdfMap::of(material, size, rule).ok()?, literal)?.divided(division))
+            let (clusters, area) = (clusters(material, &base, filter), Parameter::of(&material.model).area());
+            Some(Filtered::keeping(filter, BrdfMap::of(material, size, rule).ok()?, literal, clusters, area)?.divided(division))
         };
         let lobes = if base == Base::Normals { None } else { Some(keep(material, filter, rule)?) };
         let normals = if base.upright() {
@@ -170,36 +203,39 @@ impl Moments {
 
     /// What is found of a material at places on the maps, averaged: no lobes if these stay as they are.
     pub(crate) fn at(&self, uv: DVec2, reach: &Reach) -> FoundLobes {
-        let mean = |map: &Filtered<'_>| {
-            let mut sum: Vec<f64> = Vec::new();
-            for place in reach.places(uv) {
-                let at = map.sample(place, reach.lod);
-                sum.resize(at.len(), 0.0);
-                sum.iter_mut().zip(at).for_each(|(s, v)| *s += v / f64::from(reach.taps));
-            }
-            sum
-        };
+        let mean = |map: &Filtered<'_>| map.mean(reach.places(uv), reach.lod);
         let direction = |map: &Filtered<'_>, texel: &[f64]| map.mean_vector(texel).try_normalize().unwrap_or(DVec3::Z);
         let of_normals = || self.normals.as_ref().map(|map| direction(map, &mean(map)));
         let (masking, facing) = (self.filter.masking(), self.facing);
         let Some(map) = &self.lobes else {
             let normal = of_normals().unwrap_or(DVec3::Z);
             let (normals, below) = (Vec::new(), Vec::new());
-            return FoundLobes { normal, lobes: Mixture::Vmf(Vec::new()), normals, below, facing, masking };
+            return FoundLobes {
+                normal,
+                lobes: Mixture::Vmf(Vec::new()),
+                normals,
+                below,
+                mass: None,
+                own: Vec::new(),
+                facing,
+                masking,
+            };
         };
         let texel = mean(map);
         let lobes = map.decode(&texel);
         if let Mixture::Slopes(_) = &lobes {
-            return FoundLobes { normal: DVec3::Z, lobes, normals: Vec::new(), below: Vec::new(), facing, masking };
+            let (normals, below) = (Vec::new(), Vec::new());
+            return FoundLobes { normal: DVec3::Z, lobes, normals, below, mass: None, own: Vec::new(), facing, masking };
         }
         let by_cell = map.normals(&texel);
-        let normal = match (of_normals(), by_cell.is_empty()) {
+        let normal = match (of_normals(), by_cell.is_empty() || map.mass(&texel).is_some()) {
             (Some(normal), true) => normal,
             _ => direction(map, &texel),
         };
         let normals = (0..lobes.count()).map(|i| by_cell.get(i).and_then(|n| n.try_normalize()).unwrap_or(normal)).collect();
         let below = map.concentrations_below(&texel, lobes.count());
-        FoundLobes { normal, lobes, normals, below, facing, masking }
+        let (mass, own) = (map.mass(&texel), map.own_concentrations(&texel));
+        FoundLobes { normal, lobes, normals, below, mass, own, facing, masking }
     }
 }
 

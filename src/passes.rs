@@ -6,10 +6,11 @@ use crate::frequency::allocation::Allocation;
 use crate::gpu::pipeline::BridgeLayouts;
 use crate::gpu::retire::{Build, Retired};
 use crate::pass::gbuffer::GBuffer;
+use crate::pass::maps::MomentPasses;
 use crate::pass::materials::Kinds;
 use crate::pass::{
-    PassContext, allocate, bandwidth, base, brdf_map, classify, curvature, environment_bandwidth, luminance, prefilter, pyramid,
-    residual_level, resolve, shade, texture_space, tonemap, upsample, vmf_mips,
+    PassContext, allocate, bandwidth, base, brdf_map, classify, cluster_moments, curvature, environment_bandwidth, luminance,
+    prefilter, pyramid, residual_level, resolve, shade, texture_space, tonemap, upsample, vmf_mips,
 };
 use ash::vk;
 
@@ -18,7 +19,7 @@ pub(crate) struct Passes {
     pub environment_bandwidth: Option<environment_bandwidth::EnvironmentBandwidth>,
     pub prefilter: Option<prefilter::Prefilter>,
     /// Those over the maps of materials, if the filter stores moments.
-    pub moments: Option<(brdf_map::BrdfMap, vmf_mips::VmfMips)>,
+    pub moments: Option<MomentPasses>,
     /// Where objects have cells of their own.
     pub texture_space: Option<texture_space::TextureSpace>,
     pub gbuffer: Option<GBuffer>,
@@ -85,7 +86,11 @@ impl Passes {
                 .transpose()?,
             prefilter: looked_up.then(|| prefilter::Prefilter::new(&mut p)).transpose()?,
             moments: match config.filter.stores() {
-                true => Some((brdf_map::BrdfMap::new(&mut p, config)?, vmf_mips::VmfMips::new(&mut p, config)?)),
+                true => {
+                    let (map, mips) = (brdf_map::BrdfMap::new(&mut p, config)?, vmf_mips::VmfMips::new(&mut p, config)?);
+                    let clusters = config.filter.is_elliptic().then(|| cluster_moments::ClusterMoments::new(&mut p));
+                    Some((map, mips, clusters.transpose()?))
+                }
                 false => None,
             },
             texture_space: (config.bins == Bins::Camera).then(|| texture_space::TextureSpace::new(&mut p)).transpose()?,
@@ -110,9 +115,10 @@ impl Passes {
         if let Some(pass) = self.prefilter {
             pass.retire(bag);
         }
-        if let Some((map, mips)) = self.moments {
+        if let Some((map, mips, clusters)) = self.moments {
             map.retire(bag);
             mips.retire(bag);
+            clusters.into_iter().for_each(|pass| pass.retire(bag));
         }
         if let Some(pass) = self.texture_space {
             pass.retire(bag);

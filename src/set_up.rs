@@ -14,7 +14,7 @@ use crate::pass::gbuffer::{self, Draw};
 use crate::pass::maps::Reading;
 use crate::pass::materials::{MaterialsUpload, Uploading};
 use crate::pass::object_cells::{ObjectCells, Seats};
-use crate::pass::{PassContext, brdf_map, filter, vmf_mips};
+use crate::pass::{PassContext, brdf_map, cluster_moments, filter, vmf_mips};
 use crate::passes::{OfKinds, layout};
 use crate::renderer::{Renderer, Surfaces};
 use crate::sampling::LatLong;
@@ -78,7 +78,7 @@ impl Renderer {
             let reading = Reading { filter, bins, rule, widened, passes, samplers };
             let upload = MaterialsUpload::new(build, materials, &Uploading { reading, eps, estimator, budget })?;
             let mut p = PassContext { build, modules, bridge, slots };
-            let filter = filter::Filter::new(&mut p, config, upload.uses())?;
+            let filter = filter::Filter::new(&mut p, config, upload.uses(), upload.most_clusters())?;
             let fresh = kept != Some(upload.kinds);
             let of_kinds = fresh.then(|| OfKinds::new(&mut p, config, upload.kinds)).transpose()?;
             Ok((upload, filter, of_kinds))
@@ -90,9 +90,13 @@ impl Renderer {
         let work = upload.work();
         let fresh = upload.record(&mut rec, &mut bag);
         rec.end();
-        if let (Some((map, mips)), Some((of_map, of_mips))) = (&self.passes.moments, work) {
+        if let (Some((map, mips, clusters)), Some((of_map, of_mips, of_clusters))) = (&self.passes.moments, work) {
             map.record(&mut rec, &brdf_map::Io { maps: &fresh.maps }, &of_map);
             mips.record(&mut rec, &vmf_mips::Io { maps: &fresh.maps }, &of_map, &of_mips);
+            for (pass, of_clusters) in clusters.iter().zip(of_clusters) {
+                pass.record(&mut rec, &cluster_moments::Io { maps: &fresh.maps }, &of_clusters);
+                of_clusters.retire(&mut bag);
+            }
             of_map.retire(&mut bag);
             of_mips.retire(&mut bag);
         }
@@ -126,7 +130,7 @@ impl Renderer {
     /// share a number; [`Error::Allocation`], or as [`Self::new`] for more layers than an image has. The former room stays then.
     pub fn reserve_cells(&mut self, draws: &[Draw], memory: &mut dyn HostAllocator) -> Result<Retired> {
         let mut bag = Retired::default();
-        let (Bins::Camera, Some((_, mips))) = (self.config.bins, &self.passes.moments) else { return Ok(bag) };
+        let (Bins::Camera, Some((_, mips, _))) = (self.config.bins, &self.passes.moments) else { return Ok(bag) };
         let Some(Surfaces { images: materials, .. }) = &self.materials else {
             return Err(Error::CallOrder { called: "reserve_cells", before: "record_materials" });
         };

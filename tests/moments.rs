@@ -97,7 +97,9 @@ fn passes_store_what_the_twin_does() {
         material
     };
     scene.materials = materials().into_iter().map(named).collect();
-    for filter in filters() {
+    // tests/clusters.rs has the others.
+    let others = [Filter::Clusters, Filter::Fournier4, Filter::Fournier7, Filter::BruteForce];
+    for filter in filters().filter(|filter| !others.contains(filter)) {
         let mut session = session(&scene, &Config { filter, ..config([8, 8], Estimator::Mis, 2) });
         let names: Vec<_> = session.setup().iter().map(|(name, _)| *name).collect();
         assert!(names.contains(&"brdf_map") && names.contains(&"vmf_mips"), "{names:?}");
@@ -291,7 +293,15 @@ fn constant_maps_change_nothing() {
         // Gaussians of slopes are lobes of another shape, and masked about another normal.
         let slopes = [Filter::Lean, Filter::LeanLobe, Filter::Leadr];
         // These keep lobes of one place apart.
-        let apart = [Filter::Naive, Filter::Fixed, Filter::ToksvigLobe];
+        let apart = [
+            Filter::Naive,
+            Filter::Fixed,
+            Filter::ToksvigLobe,
+            Filter::Clusters,
+            Filter::Fournier4,
+            Filter::Fournier7,
+            Filter::BruteForce,
+        ];
         for filter in filters().filter(|filter| !slopes.contains(filter) && (name != "two lobes" || apart.contains(filter))) {
             let image = frame(filter);
             let off: DVec3 = (0..48 * 48).map(|i| (image.radiance(i) - point.radiance(i)).abs()).sum();

@@ -5,8 +5,8 @@
 #include "fit.glsl"
 
 // Whether there are materials with fits, and without.
-layout(constant_id = 11) const uint FITTED = 0u;
-layout(constant_id = 12) const uint REFLECTED = 1u;
+layout(constant_id = 12) const uint FITTED = 0u;
+layout(constant_id = 13) const uint REFLECTED = 1u;
 
 struct Approximation {
     uint count;

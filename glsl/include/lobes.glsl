@@ -13,6 +13,8 @@ layout(constant_id = 7) const uint LOBED = 0u;
 // Whether lobes are Gaussians of slopes, and how these are masked: as V-cavities or by Smith's factor.
 layout(constant_id = 8) const uint SLOPES = 0u;
 layout(constant_id = 9) const uint SMITH = 0u;
+// Whether lobes of directions are elliptic.
+layout(constant_id = 11) const uint ELLIPTIC = 0u;
 
 // As found.glsl packs them, all 0 after the last. Slopes, two layers each: mean, weight; covariance xx, xy, yy.
 layout(set = 2, binding = LOBES_BINDING) uniform usampler2DArray lobes_found;
@@ -25,6 +27,13 @@ vec4 lobe_axis[LAYERS];
 vec4 lobe_shape[LAYERS];
 // Directions: local normal.
 vec3 lobe_normal[LAYERS];
+// Elliptic: the axis and the direction across, divided by the width there over that of a round lobe.
+vec3 lobe_along[LAYERS];
+vec3 lobe_across[LAYERS];
+// How far normals follow the half vector: factors on its parts along both, and along the axis, of 1.
+vec3 lobe_follow[LAYERS];
+// What turns the lobe's direction to the normal: the axis times the sine, the cosine.
+vec4 lobe_turn[LAYERS];
 
 // The sample's lobes, with those.
 struct Lobes {
@@ -75,13 +84,27 @@ Lobes lobes_load(ivec2 p, Local f, Material m) {
             if (found_none(found)) {
                 break;
             }
-            vec3 mu = found_direction(found) * mat3(f.x, f.y, f.z), normal = found_normal(found) * mat3(f.x, f.y, f.z);
+            vec3 centre = ELLIPTIC != 0u ? found_direction_along(found) : found_direction(found);
+            vec3 below = ELLIPTIC != 0u ? found_normal_along(found) : found_normal(found);
+            vec3 mu = centre * mat3(f.x, f.y, f.z), normal = below * mat3(f.x, f.y, f.z);
             float kappa = found_concentration(found), spread = vmf_spread(kappa), height = vmf_normalisation(kappa);
             float a = ggx ? clamp(2.0 / kappa, 1e-6, 1.0) : (cosine ? max(1.0 / spread - 2.0, 0.0) : kappa);
             float peak = ggx ? a * INV_PI : (cosine ? blinn_phong_peak(a) : height / max(1.0 - spread, LEAST_PROJECTED_AREA));
             lobe_axis[i] = vec4(mu, max(dot(normal, f.view), FACING));
             lobe_shape[i] = vec4(a, peak, found_weight(found) * total, height);
             lobe_normal[i] = normal;
+            if (ELLIPTIC != 0u) {
+                vec3 x, y;
+                tangent_basis(centre, x, y);
+                vec2 axis = found_axis(found);
+                float stretch = found_stretch(found);
+                vec3 along = (x * axis.x + y * axis.y) * mat3(f.x, f.y, f.z);
+                lobe_along[i] = along / stretch;
+                lobe_across[i] = cross(mu, along) * stretch;
+                float ratio = stretch * stretch, across = 1.0 / found_narrower(found), follow = 1.0 - across / (ratio * ratio);
+                lobe_follow[i] = vec3(follow * ratio, (1.0 - across) / ratio, follow);
+                lobe_turn[i] = vec4(cross(mu, normal), dot(mu, normal));
+            }
             l.count += 1u;
         }
     }
@@ -154,19 +177,36 @@ vec4 lobes_evaluate(Material m, Lobes l, vec3 wi, vec3 wo, vec3 h) {
             vec3 d = h - axis.xyz;
             float square = dot(d, d), ch = 1.0 - 0.5 * square, sine = square * (1.0 - 0.25 * square);
             vec3 normal = lobe_normal[i];
-            float ci = dot(normal, wi), co = axis.w;
+            float mean = max(dot(normal, wi), 0.0), co = axis.w;
+            float stretched = sine, factor = 1.0, power = shape.x, whole = 1.0;
+            if (ELLIPTIC != 0u) {
+                float along = dot(d, lobe_along[i]), over = dot(d, lobe_across[i]);
+                // The normal of the places whose lobes are at the half vector, turned as the mean one is from the lobe's direction.
+                vec3 follow = lobe_follow[i], at = axis.xyz * (1.0 - follow.z * (0.5 * square));
+                at = normalize(at + lobe_along[i] * (along * follow.x) + lobe_across[i] * (over * follow.y));
+                vec4 turn = lobe_turn[i];
+                normal = at * turn.w + cross(turn.xyz, at) + turn.xyz * (dot(turn.xyz, at) / max(1.0 + turn.w, 1e-3));
+                co = max(dot(normal, wo), FACING);
+                // Towards the half vector the concentration is `factor` times as large.
+                stretched = along * along + over * over;
+                factor = sine > 0.0 ? stretched / sine : 1.0;
+                power = max(factor * (shape.x + 2.0) - 2.0, 0.0);
+                whole = (1.0 - exp(-2.0 * shape.x)) / max(1.0 - exp(-2.0 * shape.x * factor), 1e-30);
+                whole = ggx || cosine || shape.x < 1e-3 ? 1.0 : whole;
+            }
+            float ci = dot(normal, wi);
             bool lit = ci > 0.0;
             ci = lit ? ci : 1.0;
-            float q = shape.x * ch * ch + sine;
-            float exponent = cosine ? 0.5 * shape.x * log_complement(min(sine, 1.0)) : -0.5 * shape.x * square;
-            float normals = shape.y * (ggx ? 1.0 / (q * q) : exp(exponent));
+            float q = shape.x * ch * ch + stretched;
+            float exponent = cosine ? 0.5 * power * log_complement(min(sine, 1.0)) : -0.5 * shape.x * factor * square;
+            float normals = shape.y * whole * (ggx ? 1.0 / (q * q) : exp(exponent));
             normals = (ggx || cosine) && ch <= 0.0 ? 0.0 : normals;
             float open = ggx ? 1.0 / (ggx_masking(ci, shape.x) * ggx_masking(co, shape.x))
                              : min(0.25 / (ci * co), 0.5 * max(dot(normal, h), 0.0) / (across * max(ci, co)));
             float lit_weight = lit ? shape.z * ci : 0.0;
             specular += normals * open * lit_weight;
-            diffuse += lit_weight;
-            density += shape.z * (ggx || cosine ? normals * ch : shape.w * exp(exponent));
+            diffuse += shape.z * mean;
+            density += shape.z * (ggx || cosine ? normals * ch : shape.w * whole * exp(exponent));
             weights += shape.z;
         }
     }
@@ -183,9 +223,23 @@ vec4 lobes_evaluate(Material m, Lobes l, vec3 wi, vec3 wo, vec3 h) {
     return vec4(f * specular + below * (INV_PI * diffuse / weights), density);
 }
 
-// A direction of the lobe about mu: of GGX's or a cosine power's density of normals times the cosine, or of the lobe itself.
-vec3 lobes_half(bool ggx, bool cosine, vec3 mu, float a, vec2 u) {
-    float t; // 1 - cosine
+// A direction of lobe i: of GGX's or a cosine power's density of normals times the cosine, or of the lobe itself.
+vec3 lobes_half(bool ggx, bool cosine, uint i, vec2 u) {
+    vec3 mu = lobe_axis[i].xyz, x, y;
+    float a = lobe_shape[i].x, t; // 1 - cosine
+    vec2 turn = cos_sin((2.0 * u.y - 1.0) * PI);
+    if (ELLIPTIC != 0u) {
+        // Widths over a round lobe's; where it is wider by some factor, the concentration is smaller by its square.
+        float across = length(lobe_across[i]);
+        x = lobe_along[i] * across;
+        y = lobe_across[i] / across;
+        turn *= vec2(across, 1.0 / across);
+        float square = dot(turn, turn);
+        turn *= inversesqrt(square);
+        a = ggx ? a * square : (cosine ? max((a + 2.0) / square - 2.0, 0.0) : a / square);
+    } else {
+        tangent_basis(mu, x, y);
+    }
     if (ggx) {
         float square = a * u.x / max(1.0 - u.x, 1e-7); // of the tangent
         t = square / (1.0 + square + sqrt(1.0 + square));
@@ -194,9 +248,7 @@ vec3 lobes_half(bool ggx, bool cosine, vec3 mu, float a, vec2 u) {
     } else {
         t = a < 1e-4 ? 2.0 * u.x : min(-log(max(1.0 - u.x * (1.0 - exp(-2.0 * a)), 1e-30)) / a, 2.0);
     }
-    vec3 x, y;
-    tangent_basis(mu, x, y);
-    vec2 turn = cos_sin((2.0 * u.y - 1.0) * PI) * sqrt(max(t * (2.0 - t), 0.0));
+    turn *= sqrt(max(t * (2.0 - t), 0.0));
     return x * turn.x + y * turn.y + mu * (1.0 - t);
 }
 
@@ -234,7 +286,7 @@ vec3 lobes_sample(Material m, Lobes l, vec3 wo, uvec2 number) {
         h = from_tangent(m, normalize(vec3(-slope, 1.0)));
     } else {
         uint kind = m.record.kind.x;
-        h = lobes_half(kind == REFLECTANCE_GGX, kind == REFLECTANCE_BLINN_PHONG, lobe_axis[chosen].xyz, lobe_shape[chosen].x, u);
+        h = lobes_half(kind == REFLECTANCE_GGX, kind == REFLECTANCE_BLINN_PHONG, chosen, u);
     }
     float across = dot(wo, h);
     return across > 0.0 ? h * (2.0 * across) - wo : vec3(0.0);

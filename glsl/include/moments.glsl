@@ -4,6 +4,14 @@
 //   naive, fixed, toksvig, toksvig-lobe: mean direction; the mean concentration. toksvig merges lobes, the others keep them apart
 //   lean, leadr; lean-lobe:              mean slope, mean products xx and yy; mean product xy. lean-lobe keeps lobes apart
 //   vmf1:                                characteristic vector of all lobes; their mean spread
+//   clusters:                            of a base texel each lobe as naive has it; from level 1 on, in images of half the size and of
+//                                        numbers of 16 bits, the moments of each cluster, as clusters.glsl has them: mass, x, y, xx;
+//                                        then xy, yy of two clusters in a layer, or, if lobes are not about the normal, of each with
+//                                        its normal
+//   fournier4, fournier7:                the same of a base texel; from level 1 on, in images of half the size, lobes of each texel:
+//                                        direction as oct.glsl has it, concentration, mass, which is 0 of none; then, if
+//                                        lobes are not about the normal, the normals of as many
+//   bruteforce:                          of a base texel each lobe as naive has it
 //   vmf4, vmf8, vmf:                     of a base texel each lobe as vmf1 has it; from level 1 on, in images of half the size,
 //                                        of each cell weight times characteristic vector (w x, w y, w - w z) and weight w; then
 //                                        weight times spread, four cells in a layer; then, if lobes are not about the normal,
@@ -26,6 +34,10 @@ const uint FILTER_VMF1 = 9u;
 const uint FILTER_VMF4 = 10u;
 const uint FILTER_VMF8 = 11u;
 const uint FILTER_VMF = 12u;
+const uint FILTER_CLUSTERS = 13u;
+const uint FILTER_FOURNIER4 = 14u;
+const uint FILTER_FOURNIER7 = 15u;
+const uint FILTER_BRUTE_FORCE = 16u;
 
 // What a concentration is of.
 const uint LOBES_STAY = 0u;     // nothing: the material's own lobes stay
@@ -45,6 +57,11 @@ bool filter_of_slopes(uint filtering) {
 
 bool filter_of_cells(uint filtering) {
     return filtering == FILTER_VMF4 || filtering == FILTER_VMF8 || filtering == FILTER_VMF;
+}
+
+// Lobes of a texel, where these are not averaged; 0 for other filters.
+uint filter_peaks(uint filtering) {
+    return filtering == FILTER_FOURNIER4 ? 4u : (filtering == FILTER_FOURNIER7 ? 7u : 0u);
 }
 
 uint filter_cells(uint filtering) {

@@ -1,5 +1,6 @@
 //! Filters of normal and BRDF maps: what they are and what each stores.
 
+use crate::distribution::clusters::MOST_CLUSTERS;
 use crate::distribution::mixture::Masking;
 use crate::distribution::partition::Cells;
 
@@ -38,6 +39,15 @@ pub enum Filter {
     Vmf8,
     /// As many of these cells as the spread within them asks for.
     Vmf,
+    /// One elliptic lobe in each of up to eight clusters, where the map's lobes are, apart by roughness.
+    Clusters,
+    /// Four lobes a texel of each level, of which a look-up finds all (Fournier 1992).
+    Fournier4,
+    /// Seven.
+    Fournier7,
+    /// The lobes of all base texels below the pixel, by the same look-ups: what no filter can be better than. A frame draws
+    /// [`DRAWN_LOBES`] of them; its mean over frames has all.
+    BruteForce,
 }
 
 /// What a texel of a filter's mips holds.
@@ -49,11 +59,17 @@ pub(crate) enum Storage {
     Slopes { apart: bool },
     /// Characteristic vectors of all lobes, by cells of directions.
     Cells(Cells),
+    /// Moments of all lobes, by clusters that the map has.
+    Clusters,
+    /// This many lobes.
+    Peaks(usize),
+    /// Nothing beside the base texels' lobes.
+    Base,
 }
 
 impl Filter {
     /// All, those that store nothing first.
-    pub const ALL: [Self; 13] = [
+    pub const ALL: [Self; 17] = [
         Self::Point,
         Self::Tk,
         Self::Naive,
@@ -67,6 +83,10 @@ impl Filter {
         Self::Vmf4,
         Self::Vmf8,
         Self::Vmf,
+        Self::Clusters,
+        Self::Fournier4,
+        Self::Fournier7,
+        Self::BruteForce,
     ];
 
     /// The name by which it is asked for.
@@ -85,6 +105,10 @@ impl Filter {
             Self::Vmf4 => "vmf4",
             Self::Vmf8 => "vmf8",
             Self::Vmf => "vmf",
+            Self::Clusters => "clusters",
+            Self::Fournier4 => "fournier4",
+            Self::Fournier7 => "fournier7",
+            Self::BruteForce => "bruteforce",
         }
     }
 
@@ -120,6 +144,10 @@ impl Filter {
             Self::Vmf4 => Some(Storage::Cells(Cells::Four)),
             // Of which those of four and of one are sums.
             Self::Vmf8 | Self::Vmf => Some(Storage::Cells(Cells::Eight)),
+            Self::Clusters => Some(Storage::Clusters),
+            Self::Fournier4 => Some(Storage::Peaks(4)),
+            Self::Fournier7 => Some(Storage::Peaks(7)),
+            Self::BruteForce => Some(Storage::Base),
         }
     }
 
@@ -133,8 +161,35 @@ impl Filter {
         matches!(self.storage(), Some(Storage::Cells(Cells::Four | Cells::Eight)))
     }
 
+    /// Whether base texels keep their lobes as they are, and mips begin at half the size in an image of their own, if there are some.
+    pub(crate) fn keeps_base(self) -> bool {
+        self.has_cells() || matches!(self.storage(), Some(Storage::Clusters | Storage::Peaks(_) | Storage::Base))
+    }
+
+    /// Whether it has such an image.
+    pub(crate) fn has_coarser(self) -> bool {
+        self.keeps_base() && self.storage() != Some(Storage::Base)
+    }
+
+    /// Whether its lobes are elliptic.
+    pub(crate) fn is_elliptic(self) -> bool {
+        self.storage() == Some(Storage::Clusters)
+    }
+
+    /// Whether frames differ in the lobes that they find.
+    pub fn is_random(self) -> bool {
+        self.storage() == Some(Storage::Base)
+    }
+
+    /// The most lobes that it finds at a sample of a material that has one, 0 if it makes none.
+    pub fn most_lobes(self) -> u32 {
+        let apart = matches!(self.storage(), Some(Storage::Directions { apart: true } | Storage::Slopes { apart: true }));
+        let each = if self.has_slopes() { 2 } else { 1 };
+        self.lobe_layers() / each / if apart { MOST_BASE_LOBES as u32 } else { 1 }
+    }
+
     /// Layers of the image of a sample's lobes: one a lobe, two a Gaussian of slopes; none if it makes no lobes.
-    pub(crate) fn lobe_layers(self) -> u32 {
+    pub fn lobe_layers(self) -> u32 {
         let lobes = |apart| if apart { MOST_BASE_LOBES } else { 1 };
         let layers = match self.storage() {
             None => 0,
@@ -143,6 +198,10 @@ impl Filter {
             // One cell, its four parts and their eight, where it blends between them.
             Some(Storage::Cells(_)) if self == Self::Vmf => 13,
             Some(Storage::Cells(cells)) => cells.count(),
+            Some(Storage::Clusters) => MOST_CLUSTERS,
+            // Four texels of each of two levels.
+            Some(Storage::Peaks(count)) => 8 * count,
+            Some(Storage::Base) => DRAWN_LOBES,
         };
         layers as u32
     }
@@ -168,3 +227,6 @@ impl Division {
 
 /// Lobes of a material that filters take apart.
 pub const MOST_BASE_LOBES: usize = 4;
+
+/// Lobes that a frame draws with [`Filter::BruteForce`].
+pub const DRAWN_LOBES: usize = 32;

@@ -1,13 +1,16 @@
 //! A map as a filter stores it: what a lobe adds to a texel, of which mips are averages, and the lobes that a texel decodes to.
 
 use crate::distribution::brdf_map::BrdfMap;
+use crate::distribution::clusters::{Clusters, Decoded, MOMENTS};
 use crate::distribution::filter::{Division, Filter, Storage};
 use crate::distribution::literal;
 use crate::distribution::mip::Mips;
 use crate::distribution::mixture::Mixture;
 use crate::distribution::partition::Cells;
+use crate::distribution::peaks::Peaks;
 use crate::distribution::slope;
 use crate::distribution::vmf::{self, LEAST_SPREAD, Lobe};
+use crate::reflectance::vmf::LEAST_PROJECTED_AREA;
 use crate::texture::bilinear;
 use glam::{DVec2, DVec3};
 use std::borrow::Cow;
@@ -21,6 +24,8 @@ const SPREAD_RATIO: f64 = 1.5;
 
 /// Numbers of a texel for each lobe of directions: weight times mean direction, times concentration, and weight.
 const DIRECTION: usize = 5;
+/// Numbers of a lobe that is kept as it is: mass times direction, times concentration, mass; mass times the normal below.
+const KEPT: usize = 8;
 /// For each lobe of slopes: weight times mean slope and mean products xx, xy, yy, and weight.
 const SLOPE: usize = 6;
 /// For each cell: weight times characteristic vector, weight, weight times the mean length of the characteristic vectors, and weight
@@ -34,6 +39,8 @@ impl Storage {
             Self::Directions { apart } => (if apart { lobes } else { 1 }, DIRECTION),
             Self::Slopes { apart } => (if apart { lobes } else { 1 }, SLOPE),
             Self::Cells(cells) => (cells.count(), CELL),
+            // As many as there are.
+            Self::Clusters | Self::Peaks(_) | Self::Base => (0, 0),
         }
     }
 
@@ -42,6 +49,7 @@ impl Storage {
         match self {
             Self::Directions { apart } | Self::Slopes { apart } => i * usize::from(apart),
             Self::Cells(cells) => cells.of(lobe.mu),
+            Self::Clusters | Self::Peaks(_) | Self::Base => 0,
         }
     }
 
@@ -49,7 +57,7 @@ impl Storage {
     fn encode(self, lobe: &Lobe, normal: Option<DVec3>, literal: bool) -> [f64; 8] {
         let w = lobe.weight;
         match self {
-            Self::Directions { .. } => {
+            Self::Directions { .. } | Self::Clusters | Self::Peaks(_) | Self::Base => {
                 let mu = w * lobe.mu;
                 [mu.x, mu.y, mu.z, w * lobe.kappa, w, 0.0, 0.0, 0.0]
             }
@@ -79,7 +87,23 @@ pub struct Filtered<'a> {
     division: Division,
     /// The mean concentration of the map.
     constant: f64,
+    /// The mean cosine of the material's lobe of a concentration, about its direction.
+    area: Area,
+    kept: Kept,
     mips: Mips,
+}
+
+/// The mean cosine of a lobe of some concentration.
+pub(crate) type Area = fn(f64) -> f64;
+
+/// What there is beside averages.
+#[derive(Clone, Debug)]
+enum Kept {
+    Nothing,
+    Clusters(Clusters),
+    /// All look-ups' own.
+    Peaks(Peaks),
+    Base,
 }
 
 impl<'a> Filtered<'a> {
@@ -87,22 +111,40 @@ impl<'a> Filtered<'a> {
     /// 8 and 9) and its tests of length (Algorithm 1, with the weights of equation 15, without which energy would grow with the
     /// number of cells). `None` for a filter that stores nothing.
     pub fn new(filter: Filter, map: &'a BrdfMap, literal: bool) -> Option<Self> {
-        Self::over(filter, Cow::Borrowed(map), literal)
+        let clusters =
+            filter.is_elliptic().then(|| Clusters::of(map.size(), map.normal(0).is_some(), &|i| map.texel(i).to_vec()));
+        Self::over(filter, Cow::Borrowed(map), literal, clusters, |kappa| vmf::mean_cosine(kappa).max(LEAST_PROJECTED_AREA))
     }
 
-    /// The same, which keeps the map.
-    pub fn keeping(filter: Filter, map: BrdfMap, literal: bool) -> Option<Filtered<'static>> {
-        Filtered::over(filter, Cow::Owned(map), literal)
+    /// The same, which keeps the map, with its clusters if the filter has some.
+    pub(crate) fn keeping(
+        filter: Filter,
+        map: BrdfMap,
+        literal: bool,
+        clusters: Option<Clusters>,
+        area: Area,
+    ) -> Option<Filtered<'static>> {
+        Filtered::over(filter, Cow::Owned(map), literal, clusters, area)
     }
 
-    fn over(filter: Filter, map: Cow<'a, BrdfMap>, literal: bool) -> Option<Self> {
+    fn over(filter: Filter, map: Cow<'a, BrdfMap>, literal: bool, clusters: Option<Clusters>, area: Area) -> Option<Self> {
         let storage = filter.storage()?;
         let constant =
             map.lobes().iter().map(|l| l.weight * l.kappa).sum::<f64>() * map.lobes_per_texel() as f64 / map.lobes().len() as f64;
+        let kept = match (storage, clusters) {
+            (Storage::Clusters, clusters) => Kept::Clusters(clusters?),
+            (Storage::Peaks(count), _) => Kept::Peaks(Peaks::of(&map, count, area)),
+            (Storage::Base, _) => Kept::Base,
+            _ => Kept::Nothing,
+        };
         let (slots, stride) = storage.layout(map.lobes_per_texel());
-        let mips = Mips::new(map.size(), slots * stride, |i, out| encode(storage, map.texel(i), map.normal(i), literal, out));
+        let channels = if let Kept::Clusters(clusters) = &kept { clusters.all().len() * MOMENTS } else { slots * stride };
+        let mips = Mips::new(map.size(), channels, |i, out| match &kept {
+            Kept::Clusters(clusters) => encode_clusters(clusters, map.texel(i), map.normal(i), area, out),
+            _ => encode(storage, map.texel(i), map.normal(i), literal, out),
+        });
         let division = if literal { Division::PRINTED } else { Division::default() };
-        Some(Self { filter, storage, map, literal, division, constant, mips })
+        Some(Self { filter, storage, map, literal, division, constant, area, kept, mips })
     }
 
     /// The same with another rule for the cells of [`Filter::Vmf`].
@@ -122,27 +164,66 @@ impl<'a> Filtered<'a> {
 
     /// What is stored of texel `i` of a level, row by row; for level 0 what its mips average. `None` where there is none.
     pub fn texel(&self, level: usize, i: usize) -> Option<Vec<f64>> {
-        if level > 0 {
-            return self.mips.texel(level, i).map(<[f64]>::to_vec);
-        }
         let lobes = self.map.texel(i);
+        match &self.kept {
+            Kept::Base => return self.below(level, i),
+            Kept::Peaks(peaks) if level > 0 => {
+                let texel = peaks.texel(level, i);
+                let there = texel.iter().filter(|p| p.lobe.weight > 0.0);
+                return (!texel.is_empty()).then(|| there.flat_map(|p| kept(&p.lobe, p.normal, p.lobe.weight)).collect());
+            }
+            _ if level > 0 => return self.mips.texel(level, i).map(<[f64]>::to_vec),
+            Kept::Peaks(_) => return self.below(0, i),
+            Kept::Clusters(clusters) => {
+                let mut out = vec![0.0; clusters.all().len() * MOMENTS];
+                encode_clusters(clusters, lobes, self.map.normal(i), self.area, &mut out);
+                return (!lobes.is_empty()).then_some(out);
+            }
+            Kept::Nothing => {}
+        }
         let (slots, stride) = self.storage.layout(self.map.lobes_per_texel());
         let mut out = vec![0.0; slots * stride];
         encode(self.storage, lobes, self.map.normal(i), self.literal, &mut out);
         (!lobes.is_empty()).then_some(out)
     }
 
-    /// What is stored at `uv`, linearly filtered within and between levels with repeat addressing; `v` grows upwards.
+    /// The lobes of all base texels below texel `i` of a level, one behind the other, with their masses.
+    fn below(&self, level: usize, i: usize) -> Option<Vec<f64>> {
+        let (size, from) = (self.size(level), self.map.size());
+        let [x, y] = [i % size[0] as usize, i / size[0] as usize];
+        let mut all = Vec::new();
+        for (row, of_row) in covered(y, size[1], from[1]) {
+            for (column, of_column) in covered(x, size[0], from[0]) {
+                let texel = row * from[0] as usize + column;
+                let normal = |l: &Lobe| self.map.normal(texel).unwrap_or(l.mu);
+                let mass = |l: &Lobe| of_row * of_column * l.weight / (self.area)(l.kappa);
+                all.extend(self.map.texel(texel).iter().flat_map(|l| kept(l, normal(l), mass(l))));
+            }
+        }
+        (level < self.levels() && y < size[1] as usize).then_some(all)
+    }
+
+    /// What is stored at `uv`, linearly filtered within and between levels with repeat addressing; `v` grows upwards. Where texels
+    /// keep lobes of their own, all of them.
     pub fn sample(&self, uv: DVec2, lod: f64) -> Vec<f64> {
+        self.mean(std::iter::once(uv), lod)
+    }
+
+    /// The mean of what is stored at some places.
+    pub(crate) fn mean(&self, places: impl ExactSizeIterator<Item = DVec2>, lod: f64) -> Vec<f64> {
         let last = self.levels() - 1;
         let lod = lod.clamp(0.0, last as f64);
-        let at = |level: usize| bilinear(self.size(level), uv, |i| Sum(self.texel(level, i).unwrap_or_default())).0;
-        let near = at(lod as usize);
-        if lod.fract() == 0.0 {
-            return near;
-        }
-        let far = at((lod as usize + 1).min(last));
-        near.iter().zip(far).map(|(a, b)| a + (b - a) * lod.fract()).collect()
+        let sum = |texel: Option<Vec<f64>>| match self.kept {
+            Kept::Peaks(_) | Kept::Base => Sum::Joined(texel.unwrap_or_default()),
+            _ => Sum::Added(texel.unwrap_or_default()),
+        };
+        let at = |uv: DVec2, level: usize| bilinear(self.size(level), uv, |i| sum(self.texel(level, i)));
+        let share = 1.0 / places.len() as f64;
+        let between = |uv: DVec2| match lod.fract() {
+            0.0 => at(uv, lod as usize),
+            part => at(uv, lod as usize) * (1.0 - part) + at(uv, (lod as usize + 1).min(last)) * part,
+        };
+        places.map(|uv| between(uv) * share).reduce(Add::add).map_or_else(Vec::new, Sum::all)
     }
 
     /// The lobes of what is stored, or of an average of it.
@@ -151,18 +232,57 @@ impl<'a> Filtered<'a> {
             Storage::Directions { .. } => Mixture::Vmf(texel.as_chunks().0.iter().filter_map(|t| self.direction(*t)).collect()),
             Storage::Slopes { .. } => Mixture::Slopes(texel.as_chunks().0.iter().filter_map(|t| gaussian(*t)).collect()),
             Storage::Cells(_) => Mixture::Vmf(self.cells(texel).into_iter().map(|(lobe, _)| lobe).collect()),
+            Storage::Clusters => {
+                let found = self.clusters(texel).map_or_else(Vec::new, |found| found.0);
+                Mixture::Elliptic(found.into_iter().map(|found| found.lobe).collect())
+            }
+            Storage::Peaks(_) | Storage::Base => {
+                let mass = self.mass(texel).unwrap_or(1.0);
+                Mixture::Vmf(texel.as_chunks().0.iter().filter_map(|t| lobe_kept(*t, mass)).map(|(lobe, _)| lobe).collect())
+            }
         }
     }
 
-    /// The normals below each lobe of [`Self::decode`], of any length above 0; none where lobes are not by cells.
+    /// The lobes of clusters and their mass.
+    fn clusters(&self, texel: &[f64]) -> Option<(Vec<Decoded>, f64)> {
+        if let Kept::Clusters(clusters) = &self.kept { Some(clusters.decode(texel)) } else { None }
+    }
+
+    /// The concentrations below each of the lobes of [`Self::decode`] beside which the rest of their widths is the spread of
+    /// normals; none where lobes do not say it.
+    pub fn own_concentrations(&self, texel: &[f64]) -> Vec<f64> {
+        self.clusters(texel).map_or_else(Vec::new, |found| found.0.iter().map(|l| l.own).collect())
+    }
+
+    /// Those of the map, if the filter has some.
+    pub fn clusters_of_map(&self) -> Option<&Clusters> {
+        if let Kept::Clusters(clusters) = &self.kept { Some(clusters) } else { None }
+    }
+
+    /// The sum of the masses over solid angle of the lobes of [`Self::decode`], where that is stored: of lobes that each fill the
+    /// projected area about their own normal.
+    pub fn mass(&self, texel: &[f64]) -> Option<f64> {
+        match self.storage {
+            Storage::Clusters => self.clusters(texel).map(|found| found.1),
+            Storage::Peaks(_) | Storage::Base => Some(texel.as_chunks().0.iter().map(|t: &[f64; KEPT]| t[4]).sum()),
+            Storage::Directions { .. } | Storage::Slopes { .. } | Storage::Cells(_) => None,
+        }
+    }
+
+    /// The normals below each lobe of [`Self::decode`], of any length above 0; none where lobes share theirs.
     pub fn normals(&self, texel: &[f64]) -> Vec<DVec3> {
         match self.storage {
             Storage::Cells(_) => self.cells(texel).into_iter().map(|(_, normal)| normal).collect(),
+            Storage::Clusters => self.clusters(texel).map_or_else(Vec::new, |f| f.0.iter().map(|l| l.normal).collect()),
+            Storage::Peaks(_) | Storage::Base => {
+                texel.as_chunks().0.iter().filter_map(|t| lobe_kept(*t, 1.0)).map(|(_, normal)| normal).collect()
+            }
             Storage::Directions { .. } | Storage::Slopes { .. } => Vec::new(),
         }
     }
 
-    /// The mean concentration of what is below each of the `count` lobes of [`Self::decode`]; none for slopes.
+    /// The mean concentration of what is below each of the `count` lobes of [`Self::decode`]; none for slopes, and where
+    /// [`Self::mass`] says it.
     pub fn concentrations_below(&self, texel: &[f64], count: usize) -> Vec<f64> {
         match self.storage {
             Storage::Directions { .. } if self.filter == Filter::Fixed => vec![self.constant; count],
@@ -171,7 +291,7 @@ impl<'a> Filtered<'a> {
                 let all = texel.as_chunks().0.iter().fold(Cell([0.0; CELL]), |sum, t| sum.plus(&Cell(*t)));
                 vec![vmf::concentration(all.base_spread()); count]
             }
-            Storage::Slopes { .. } => Vec::new(),
+            Storage::Slopes { .. } | Storage::Clusters | Storage::Peaks(_) | Storage::Base => Vec::new(),
         }
     }
 
@@ -195,6 +315,10 @@ impl<'a> Filtered<'a> {
             }
             Storage::Cells(_) => texel.as_chunks().0.iter().map(|t| Cell(*t).normal()).sum(),
             Storage::Slopes { .. } => DVec3::Z,
+            Storage::Clusters => self.clusters_of_map().map_or(DVec3::Z, |clusters| clusters.mean_vector(texel)),
+            Storage::Peaks(_) | Storage::Base => {
+                texel.as_chunks().0.iter().map(|t: &[f64; KEPT]| DVec3::new(t[5], t[6], t[7])).sum()
+            }
         }
     }
 
@@ -252,21 +376,66 @@ impl<'a> Filtered<'a> {
     }
 }
 
-/// Stored numbers, added and scaled one by one.
-struct Sum(Vec<f64>);
+/// Stored numbers, scaled one by one; added one by one, or one behind the other.
+enum Sum {
+    Added(Vec<f64>),
+    Joined(Vec<f64>),
+}
+
+impl Sum {
+    fn all(self) -> Vec<f64> {
+        match self {
+            Self::Added(all) | Self::Joined(all) => all,
+        }
+    }
+}
 
 impl Add for Sum {
     type Output = Self;
     fn add(self, other: Self) -> Self {
-        Self(self.0.iter().zip(other.0).map(|(a, b)| a + b).collect())
+        match self {
+            Self::Added(all) => Self::Added(all.iter().zip(other.all()).map(|(a, b)| a + b).collect()),
+            Self::Joined(mut all) => {
+                all.extend(other.all());
+                Self::Joined(all)
+            }
+        }
     }
 }
 
 impl Mul<f64> for Sum {
     type Output = Self;
     fn mul(mut self, factor: f64) -> Self {
-        self.0.iter_mut().for_each(|c| *c *= factor);
+        let (Self::Added(all) | Self::Joined(all)) = &mut self;
+        all.iter_mut().for_each(|c| *c *= factor);
         self
+    }
+}
+
+/// The texels of `from` that texel `i` of `size` covers, on one axis, and their shares.
+fn covered(i: usize, size: u32, from: u32) -> impl Iterator<Item = (usize, f64)> {
+    let (size, from) = (size as usize, from as usize);
+    let (start, end) = (i * from, (i + 1) * from);
+    let share = move |k: usize| (end.min((k + 1) * size) - start.max(k * size)) as f64 / from as f64;
+    (start / size..end.div_ceil(size)).map(move |k| (k, share(k)))
+}
+
+/// A lobe with the mass `q`.
+fn kept(l: &Lobe, normal: DVec3, q: f64) -> [f64; KEPT] {
+    let n = q * normal.normalize_or(DVec3::Z);
+    [q * l.mu.x, q * l.mu.y, q * l.mu.z, q * l.kappa, q, n.x, n.y, n.z]
+}
+
+fn lobe_kept([x, y, z, kappa, q, nx, ny, nz]: [f64; KEPT], mass: f64) -> Option<(Lobe, DVec3)> {
+    let mu = DVec3::new(x, y, z).try_normalize().unwrap_or(DVec3::Z);
+    (q > 0.0).then(|| (Lobe { mu, kappa: kappa / q, weight: q / mass }, DVec3::new(nx, ny, nz)))
+}
+
+fn encode_clusters(clusters: &Clusters, lobes: &[Lobe], normal: Option<DVec3>, area: Area, out: &mut [f64]) {
+    out.fill(0.0);
+    for lobe in lobes {
+        let (i, moments) = clusters.encode(lobe, normal, lobe.weight / area(lobe.kappa));
+        out[i * MOMENTS..].iter_mut().zip(moments).for_each(|(sum, m)| *sum += m);
     }
 }
 

@@ -1,6 +1,6 @@
 //! What a filter decodes: lobes, and the microfacet distribution that they are.
 
-use crate::distribution::{slope, vmf};
+use crate::distribution::{elliptic, slope, vmf};
 use crate::reflectance::cavity;
 use crate::reflectance::vmf::LEAST_PROJECTED_AREA;
 use glam::{DVec2, DVec3};
@@ -10,6 +10,8 @@ use glam::{DVec2, DVec3};
 pub enum Mixture {
     /// Mean direction and concentration.
     Vmf(Vec<vmf::Lobe>),
+    /// The same with concentrations along an axis and across.
+    Elliptic(Vec<elliptic::Lobe>),
     /// Mean slope and its covariance.
     Slopes(Vec<slope::Lobe>),
 }
@@ -28,6 +30,7 @@ impl Mixture {
     pub fn count(&self) -> usize {
         match self {
             Self::Vmf(lobes) => lobes.len(),
+            Self::Elliptic(lobes) => lobes.len(),
             Self::Slopes(lobes) => lobes.len(),
         }
     }
@@ -36,6 +39,7 @@ impl Mixture {
     pub fn weight(&self) -> f64 {
         match self {
             Self::Vmf(lobes) => lobes.iter().map(|l| l.weight).sum(),
+            Self::Elliptic(lobes) => lobes.iter().map(|l| l.round.weight).sum(),
             Self::Slopes(lobes) => lobes.iter().map(|l| l.weight).sum(),
         }
     }
@@ -44,6 +48,7 @@ impl Mixture {
     pub fn density(&self, h: DVec3) -> f64 {
         match self {
             Self::Vmf(lobes) => lobes.iter().map(|l| l.density(h)).sum(),
+            Self::Elliptic(lobes) => lobes.iter().map(|l| l.density(h)).sum(),
             Self::Slopes(lobes) => lobes.iter().map(|l| l.density(h)).sum(),
         }
     }
@@ -68,6 +73,10 @@ impl Mixture {
                 let lobe = lobes.iter().find(|l| chosen(l.weight)).or(lobes.last());
                 lobe.map_or(DVec3::Z, |l| l.sample(within))
             }
+            Self::Elliptic(lobes) => {
+                let lobe = lobes.iter().find(|l| chosen(l.round.weight)).or(lobes.last());
+                lobe.map_or(DVec3::Z, |l| l.sample(within))
+            }
             Self::Slopes(lobes) => {
                 let lobe = lobes.iter().find(|l| chosen(l.weight)).or(lobes.last());
                 lobe.map_or(DVec3::Z, |l| l.sample(within))
@@ -79,13 +88,12 @@ impl Mixture {
     /// weight: the integral of `D cos` is the weight. Of directions, by the projected area that their mean vectors give
     /// (`n . sum(w r) / sum(w)`, at least 0.05, where what is below the horizon counts); of slopes, each has its own.
     pub fn distribution(&self, h: DVec3) -> f64 {
-        match self {
-            Self::Vmf(lobes) => {
-                let area = lobes.iter().map(|l| l.mean().z).sum::<f64>() / self.weight().max(f64::MIN_POSITIVE);
-                self.density(h) / area.max(LEAST_PROJECTED_AREA)
-            }
-            Self::Slopes(_) => self.density(h) / h.z.max(f64::MIN_POSITIVE),
-        }
+        let projected = match self {
+            Self::Vmf(lobes) => lobes.iter().map(|l| l.mean().z).sum::<f64>(),
+            Self::Elliptic(lobes) => lobes.iter().map(|l| l.mean().z).sum(),
+            Self::Slopes(_) => return self.density(h) / h.z.max(f64::MIN_POSITIVE),
+        };
+        self.density(h) / (projected / self.weight().max(f64::MIN_POSITIVE)).max(LEAST_PROJECTED_AREA)
     }
 
     /// One lobe of slopes with the moments and the weight of all.
@@ -94,8 +102,21 @@ impl Mixture {
             let mean = slope::of(l.mu);
             slope::Lobe { mean, covariance: slope::carried(mean, l.kappa), weight: l.weight }
         };
+        let ellipse = |l: &elliptic::Lobe| {
+            let round = &l.round;
+            let mean = slope::of(round.mu);
+            let cosine = round.mu.z.max(slope::LEAST_COSINE);
+            let mut covariance = [0.0; 3];
+            for (tangent, kappa) in [(l.axis, round.kappa / l.ratio), (round.mu.cross(l.axis), round.kappa * l.ratio)] {
+                let by = -(tangent.truncate() + mean * tangent.z) / cosine;
+                let products = [by.x * by.x, by.x * by.y, by.y * by.y];
+                covariance.iter_mut().zip(products).for_each(|(sum, product)| *sum += product * slope::variance(kappa));
+            }
+            slope::Lobe { mean, covariance, weight: round.weight }
+        };
         let lobes: Vec<_> = match self {
             Self::Vmf(lobes) => lobes.iter().map(lobe).collect(),
+            Self::Elliptic(lobes) => lobes.iter().map(ellipse).collect(),
             Self::Slopes(lobes) => lobes.clone(),
         };
         let total = self.weight();

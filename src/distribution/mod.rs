@@ -7,7 +7,10 @@
 
 pub mod brdf_map;
 pub mod chart;
+mod cluster_search;
+pub mod clusters;
 pub mod effective;
+pub mod elliptic;
 pub mod filter;
 pub mod filtered;
 pub mod fit;
@@ -16,14 +19,17 @@ pub mod literal;
 pub mod mip;
 pub mod mixture;
 pub mod partition;
+pub mod peaks;
 pub mod prefilter;
 pub mod reflected;
 pub mod slope;
+pub mod stereographic;
 pub mod suns;
 pub mod surface;
 pub mod vmf;
 
 pub use brdf_map::BrdfMap;
+pub use clusters::Clusters;
 pub use filter::{Division, Filter, MOST_BASE_LOBES};
 pub use filtered::Filtered;
 pub use fit::LobeFit;

@@ -6,13 +6,14 @@
 //! Gaussians of slopes (LEAN, LEADR) are one distribution about the surface's own normal, which fills its area.
 
 use crate::distribution::effective;
+use crate::distribution::elliptic;
 use crate::distribution::mixture::{Masking, Mixture};
 use crate::distribution::vmf::{self, Lobe};
 use crate::material::{LEAST_ALPHA, MOST_CONCENTRATION};
 use crate::reflectance::vmf::LEAST_PROJECTED_AREA;
-use crate::reflectance::{BlinnPhong, Model, Reflectance, ggx};
+use crate::reflectance::{Model, Reflectance, ggx};
 use glam::{DVec2, DVec3};
-use std::f64::consts::PI;
+use std::f64::consts::{PI, TAU};
 
 /// The least cosine of a facet to the viewer: one that faces away counts as bent to there, as shading normals are.
 const FACING: f64 = 0.02;
@@ -26,8 +27,13 @@ pub struct FoundLobes {
     pub lobes: Mixture,
     /// The normals below each lobe, unit; none for slopes.
     pub normals: Vec<DVec3>,
-    /// The mean concentration of the lobes below each; none for slopes.
+    /// The mean concentration of the lobes below each; none for slopes, and where the mass is known.
     pub below: Vec<f64>,
+    /// What the lobes below integrate to over solid angle, of one direction each, if it is known.
+    pub mass: Option<f64>,
+    /// The concentrations of the lobes below each, beside which the rest of its width is the spread of their normals: towards a half
+    /// vector the normal is that of the places whose lobes are there. None where normals stay the mean ones.
+    pub own: Vec<f64>,
     /// The mean cosine of the directions of a place's lobes to its normal.
     pub facing: f64,
     /// How they are masked, if they are slopes.
@@ -39,6 +45,7 @@ impl FoundLobes {
     pub fn widened(mut self, kernel: f64) -> Self {
         match &mut self.lobes {
             Mixture::Vmf(lobes) => lobes.iter_mut().for_each(|l| l.kappa /= 1.0 + 0.5 * l.kappa * kernel),
+            Mixture::Elliptic(lobes) => lobes.iter_mut().for_each(|l| *l = l.widened(kernel)),
             Mixture::Slopes(lobes) => {
                 lobes.iter_mut().for_each(|l| [0, 2].into_iter().for_each(|i| l.covariance[i] += 0.5 * kernel));
             }
@@ -55,13 +62,40 @@ fn mean_cosine(model: &Model, kappa: f64) -> f64 {
     }
 }
 
+/// A lobe and the normal below it.
+#[derive(Clone, Debug)]
+struct Facet {
+    lobe: elliptic::Lobe,
+    /// The mean.
+    normal: DVec3,
+    /// How far the normals follow the half vector along the axis and across, of 1.
+    follows: [f64; 2],
+}
+
+impl Facet {
+    /// The normal of the places whose lobes are at `h`: turned as the mean normal is from the lobe's direction.
+    fn normal_at(&self, h: DVec3) -> DVec3 {
+        let [along, across] = self.follows;
+        if along <= 0.0 {
+            return self.normal;
+        }
+        let (mu, axis) = (self.lobe.round.mu, self.lobe.axis);
+        let (off, other) = (h - mu, mu.cross(axis));
+        let part = mu * (1.0 - along * 0.5 * off.length_squared());
+        let at = (part + axis * (along * off.dot(axis)) + other * (across * off.dot(other))).normalize_or(mu);
+        let (turn, cosine) = (mu.cross(self.normal), mu.dot(self.normal));
+        at * cosine + turn.cross(at) + turn * (turn.dot(at) / (1.0 + cosine).max(1e-3))
+    }
+}
+
 /// A model with the lobes that were found in the place of its own, in the frame about the shading normal.
 #[derive(Clone, Debug)]
 pub struct Surface {
     /// With the colours of its maps.
     model: Model,
-    lobes: Mixture,
-    normals: Vec<DVec3>,
+    facets: Vec<Facet>,
+    /// In their place.
+    slopes: Option<Mixture>,
     masking: Masking,
     /// Factor on what is specular, and albedo below: of vMF lobes, which have none of their own.
     specular: DVec3,
@@ -73,15 +107,21 @@ impl Surface {
     pub fn new(model: Model, found: &FoundLobes, specular: DVec3, base: DVec3) -> Self {
         let frame = effective::about(found.normal).transpose();
         let area = |kappa| mean_cosine(&model, kappa);
-        let turned = |(l, below): (&Lobe, &f64)| {
-            let weight = l.weight * area(l.kappa) / (found.facing * area(*below));
-            Lobe { mu: frame * l.mu, weight, ..*l }
+        let of = |i: usize| found.mass.map_or_else(|| found.below.get(i).map_or(1.0, |kappa| area(*kappa)), |mass| 1.0 / mass);
+        let turned = |(i, l): (usize, elliptic::Lobe)| {
+            let weight = l.round.weight * area(l.round.kappa) / (found.facing * of(i));
+            let normal = frame * found.normals.get(i).copied().unwrap_or(found.normal);
+            let follows = found.own.get(i).map_or([0.0; 2], |own| {
+                [l.round.kappa / l.ratio, l.round.kappa * l.ratio].map(|kappa| (1.0 - kappa / own).max(0.0))
+            });
+            let round = Lobe { mu: frame * l.round.mu, weight, ..l.round };
+            Facet { lobe: elliptic::Lobe { round, axis: frame * l.axis, ..l }, normal, follows }
         };
-        let lobes = match &found.lobes {
-            Mixture::Vmf(lobes) => Mixture::Vmf(lobes.iter().zip(&found.below).map(turned).collect()),
-            slopes @ Mixture::Slopes(_) => slopes.clone(),
+        let (facets, slopes) = match &found.lobes {
+            Mixture::Vmf(lobes) => (lobes.iter().map(|l| (*l).into()).enumerate().map(turned).collect(), None),
+            Mixture::Elliptic(lobes) => (lobes.iter().copied().enumerate().map(turned).collect(), None),
+            slopes @ Mixture::Slopes(_) => (Vec::new(), Some(slopes.clone())),
         };
-        let normals = found.normals.iter().map(|n| frame * *n).collect();
         let total = match &model {
             Model::Vmf(vmf) => vmf.lobes().iter().map(|l| l.weight).sum(),
             _ => 1.0,
@@ -91,7 +131,7 @@ impl Surface {
             Model::BlinnPhong(b) => (b.specular, b.albedo),
             Model::Vmf(_) | Model::Table(_) | Model::Turned(_) => (specular * total, base),
         };
-        Self { model, lobes, normals, masking: found.masking, specular, base }
+        Self { model, facets, slopes, masking: found.masking, specular, base }
     }
 
     /// Fresnel reflectance, and the base below it.
@@ -105,24 +145,24 @@ impl Surface {
     }
 
     /// `D G / (4 cos cos)` of a facet whose normal has the cosines `ci`, `co` and `ch` to light, viewer and half vector; `square` is the
-    /// squared distance of the half vector from the lobe's direction, which sharp lobes need, `across` its cosine to the viewer.
-    fn facet(&self, kappa: f64, [ci, co, ch]: [f64; 3], square: f64, across: f64) -> f64 {
+    /// squared distance of the half vector from the lobe's direction, which sharp lobes need, `factor` that on the concentration
+    /// towards it, `across` its cosine to the viewer.
+    fn facet(&self, kappa: f64, factor: f64, [ci, co, ch]: [f64; 3], square: f64, across: f64) -> f64 {
         let cosine = 1.0 - 0.5 * square;
-        let h = DVec3::new((square * (1.0 - 0.25 * square)).max(0.0).sqrt(), 0.0, cosine);
+        let sine = (square * (1.0 - 0.25 * square)).max(0.0);
         let cavity = (0.25 / (ci * co)).min(0.5 * ch.max(0.0) / (across * ci.max(co)));
         match &self.model {
             Model::Ggx(_) if cosine > 0.0 => {
                 let alpha = (2.0 / kappa).sqrt().clamp(LEAST_ALPHA, 1.0);
-                ggx::distribution(alpha, h) * ggx::masking(alpha, ci) * ggx::masking(alpha, co)
+                let a = alpha * alpha;
+                a / (PI * (a * cosine * cosine + factor * sine).powi(2)) * ggx::masking(alpha, ci) * ggx::masking(alpha, co)
             }
-            Model::BlinnPhong(b) if cosine > 0.0 => {
+            Model::BlinnPhong(_) if cosine > 0.0 => {
                 let exponent = (1.0 / vmf::spread(kappa) - 2.0).clamp(0.0, MOST_CONCENTRATION);
-                BlinnPhong { exponent, ..*b }.distribution(h) * cavity
+                let there = (factor * (exponent + 2.0) - 2.0).max(0.0);
+                (exponent + 2.0) / TAU * (0.5 * there * (-sine.min(1.0)).ln_1p()).exp() * cavity
             }
-            Model::Vmf(_) => {
-                let height = vmf::normalisation(kappa) / vmf::mean_cosine(kappa).max(LEAST_PROJECTED_AREA);
-                height * (-0.5 * kappa * square).exp() * cavity
-            }
+            Model::Vmf(_) => elliptic::height(kappa, factor, square) / vmf::mean_cosine(kappa).max(LEAST_PROJECTED_AREA) * cavity,
             _ => 0.0,
         }
     }
@@ -136,26 +176,26 @@ impl Reflectance for Surface {
         let h = (wi + wo).normalize();
         let across = wo.dot(h);
         let (fresnel, below) = self.colours(across);
-        let (specular, lit) = match &self.lobes {
-            Mixture::Vmf(lobes) => {
-                let (mut specular, mut lit, mut weights) = (0.0, 0.0, 0.0);
-                for (lobe, normal) in lobes.iter().zip(&self.normals) {
-                    weights += lobe.weight;
-                    let ci = normal.dot(wi);
-                    if ci <= 0.0 {
-                        continue;
-                    }
-                    let cosines = [ci, normal.dot(wo).max(FACING), normal.dot(h)];
-                    specular += lobe.weight * ci * self.facet(lobe.kappa, cosines, (h - lobe.mu).length_squared(), across);
-                    lit += lobe.weight * ci;
+        let (specular, lit) = if let Some(slopes) = &self.slopes {
+            let lit = |b: DVec2| (-b).extend(1.0).normalize().dot(wi).max(0.0);
+            let lit = if let Mixture::Slopes(lobes) = slopes { lobes.iter().map(|l| l.weight * lit(l.mean)).sum() } else { 0.0 };
+            (slopes.specular(wi, wo, self.masking), lit / wi.z)
+        } else {
+            let (mut specular, mut lit, mut weights) = (0.0, 0.0, 0.0);
+            for facet in &self.facets {
+                let Facet { lobe, normal: mean, .. } = facet;
+                let (round, normal) = (&lobe.round, facet.normal_at(h));
+                weights += round.weight;
+                lit += round.weight * mean.dot(wi).max(0.0);
+                let ci = normal.dot(wi);
+                if ci <= 0.0 {
+                    continue;
                 }
-                (specular / wi.z, lit / wi.z / f64::max(weights, f64::MIN_POSITIVE))
+                let cosines = [ci, normal.dot(wo).max(FACING), normal.dot(h)];
+                let square = (h - round.mu).length_squared();
+                specular += round.weight * ci * self.facet(round.kappa, lobe.factor(h), cosines, square, across);
             }
-            Mixture::Slopes(lobes) => {
-                let lit = |b: DVec2| (-b).extend(1.0).normalize().dot(wi).max(0.0);
-                let lit = lobes.iter().map(|l| l.weight * lit(l.mean)).sum::<f64>();
-                (self.lobes.specular(wi, wo, self.masking), lit / wi.z)
-            }
+            (specular / wi.z, lit / wi.z / f64::max(weights, f64::MIN_POSITIVE))
         };
         fresnel * specular + below * (lit / PI)
     }

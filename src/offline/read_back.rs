@@ -2,7 +2,7 @@
 
 use crate::gpu::access::Access;
 use crate::gpu::buffer::Buffer;
-use crate::gpu::image::Image;
+use crate::gpu::image::{Image, texel_bytes};
 use crate::gpu::memory::Location;
 use crate::gpu::recorder::Recorder;
 use crate::gpu::retire::{Build, Retired};
@@ -84,12 +84,17 @@ impl Session {
             for (desc, layer) in layers.into_iter().flat_map(|(desc, layers)| layers.map(move |layer| (desc, layer))) {
                 let level = |level| {
                     let [width, height, _] = desc.level_extent(level);
-                    let bytes = self.read(u64::from(width) * u64::from(height) * 16, |renderer, rec, target| {
+                    let texel = texel_bytes(desc.format);
+                    let bytes = self.read(u64::from(width) * u64::from(height) * texel, |renderer, rec, target| {
                         if let Some((image, _)) = of(renderer).and_then(|arrays| arrays[i].clone()) {
                             copy_layers(rec, image, target, level, layer..layer + 1);
                         }
                     })?;
-                    Ok(([width, height], bytemuck::pod_collect_to_vec(&bytes)))
+                    if desc.format != vk::Format::R16G16B16A16_SFLOAT {
+                        return Ok(([width, height], bytemuck::pod_collect_to_vec(&bytes)));
+                    }
+                    let halves: Vec<[half::f16; 4]> = bytemuck::pod_collect_to_vec(&bytes);
+                    Ok(([width, height], halves.iter().map(|texel| texel.map(half::f16::to_f32)).collect()))
                 };
                 found.push((0..desc.levels).map(level).collect::<Result<_>>()?);
             }

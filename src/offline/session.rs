@@ -20,8 +20,8 @@ use crate::offline::shown::Shown;
 use crate::offline::window::{Window, near};
 use crate::offline::world::World;
 use crate::offline::{fit_cache, lobe_cache};
-use crate::pass::PassContext;
 use crate::pass::probe::Probe;
+use crate::pass::{PassContext, brdf_map, cluster_moments, vmf_mips};
 use crate::plan::Levels;
 use crate::renderer::Renderer;
 use crate::sampling::LatLong;
@@ -349,7 +349,7 @@ impl Drop for Session {
 
 /// Times of the passes that made the materials' maps.
 fn of_maps(renderer: &Renderer) -> Result<SetupTimes> {
-    let known = |name: &&str| [crate::pass::brdf_map::NAME, crate::pass::vmf_mips::NAME].contains(name);
+    let known = |name: &&str| [brdf_map::NAME, vmf_mips::NAME, cluster_moments::NAME].contains(name);
     Ok(renderer.set_up_timings()?.unwrap_or_default().passes.into_iter().filter(|(name, _)| known(name)).collect())
 }
 

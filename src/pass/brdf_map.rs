@@ -3,7 +3,7 @@
 
 use crate::config::Config;
 use crate::distribution::filter::Storage;
-use crate::distribution::{Cells, Filter, MOST_BASE_LOBES, vmf};
+use crate::distribution::{Cells, Filter, MOST_BASE_LOBES, clusters, vmf};
 use crate::error::Result;
 use crate::gpu::access::Access;
 use crate::gpu::image::{Image, ImageDesc};
@@ -79,6 +79,8 @@ pub(crate) struct Source {
     pub rule: [f32; 2],
     pub base: Base,
     pub parameter: Parameter,
+    /// The first of its clusters in the table, and how many there are.
+    pub clusters: [u32; 2],
 }
 
 /// How many layers a source takes: of moments, and of cells.
@@ -90,16 +92,22 @@ pub(crate) struct Layers {
 
 impl Layers {
     /// As `glsl/include/moments.glsl` says.
-    pub fn of(filter: Filter, base: &Base) -> Self {
+    pub fn of(filter: Filter, base: &Base, clusters: u32) -> Self {
         let count = base.lobes().len();
         let (merged, each, cells) = match filter.storage() {
             None | Some(Storage::Cells(Cells::One)) => (true, 1, 0),
             Some(Storage::Directions { apart }) => (!apart, 1, 0),
             Some(Storage::Slopes { apart }) => (!apart, 2, 0),
             Some(Storage::Cells(cells)) => (false, 1, cells.count()),
+            Some(Storage::Clusters | Storage::Peaks(_) | Storage::Base) => (false, 1, 0),
         };
-        // With their spreads, four in a layer, and the normals below lobes that are about other directions.
-        let cells = cells + cells / 4 + if base.upright() { 0 } else { cells };
+        let cells = match filter.storage() {
+            Some(Storage::Clusters) => clusters::layers(clusters as usize, !base.upright()),
+            // With normals in layers behind all.
+            Some(Storage::Peaks(peaks)) => peaks * if base.upright() { 1 } else { 2 },
+            // With their spreads, four in a layer, and the normals below lobes that are about other directions.
+            _ => cells + cells / 4 + if base.upright() { 0 } else { cells },
+        };
         let lobes = if merged { count.min(1) } else { count };
         Self { moments: usize::from(!base.upright()) + each * lobes, cells: if count > 0 { cells } else { 0 } }
     }
@@ -131,30 +139,47 @@ impl Group {
         first
     }
 
-    /// Images of moments and, where there are some, of cells, with room for the mips that `filter` reads.
-    pub fn images(&self, build: &mut Build<'_>, filter: Filter) -> Result<Vec<Image>> {
+    /// Images of moments and, where there are some, of cells, clusters or peaks, with room for the mips that `filter` reads; without
+    /// the latter if these are `filled` from the host.
+    pub fn images(&self, build: &mut Build<'_>, filter: Filter, filled: bool) -> Result<Vec<Image>> {
         let [width, height] = self.size;
         let levels = 1 + width.max(height).ilog2();
         // Beside cells only a mean normal has mips.
-        let flat = filter.has_cells() && self.sources.iter().all(|(source, _)| source.base.upright());
+        let flat = filter.keeps_base() && self.sources.iter().all(|(source, _)| source.base.upright());
         let mut images = vec![image(build, "moments", self.size, self.layers.moments, if flat { 1 } else { levels })?];
-        if self.layers.cells > 0 {
-            images.push(cells(build, self.size, self.layers.cells)?);
+        if self.layers.cells > 0 && !filled {
+            images.push(coarser(build, filter, self.size, self.layers.cells)?);
         }
         Ok(images)
     }
 }
 
-/// An image of cells of a map of `size`, with its levels from 1 on.
-pub(crate) fn cells(build: &mut Build<'_>, size: [u32; 2], layers: usize) -> Result<Image> {
-    let levels = size[0].max(size[1]).ilog2();
-    image(build, "cells", halved(size), layers, levels.max(1))
+/// What mips from level 1 on are, in an image of their own: peaks are filled from the host.
+pub(crate) fn coarser_desc(filter: Filter, size: [u32; 2], layers: usize) -> ImageDesc {
+    let levels = size[0].max(size[1]).ilog2().max(1);
+    let desc = desc("cells", halved(size), layers, levels);
+    match filter.storage() {
+        Some(Storage::Clusters) => ImageDesc { name: "clusters", format: vk::Format::R16G16B16A16_SFLOAT, ..desc },
+        Some(Storage::Peaks(_)) => {
+            ImageDesc { name: "peaks", usage: vk::ImageUsageFlags::SAMPLED | vk::ImageUsageFlags::TRANSFER_SRC, ..desc }
+        }
+        _ => desc,
+    }
 }
 
-fn image(build: &mut Build<'_>, name: &'static str, [width, height]: [u32; 2], layers: usize, levels: u32) -> Result<Image> {
+/// That image, of a map of `size`.
+pub(crate) fn coarser(build: &mut Build<'_>, filter: Filter, size: [u32; 2], layers: usize) -> Result<Image> {
+    Image::new(build, coarser_desc(filter, size, layers))
+}
+
+fn desc(name: &'static str, [width, height]: [u32; 2], layers: usize, levels: u32) -> ImageDesc {
     let usage = vk::ImageUsageFlags::STORAGE | vk::ImageUsageFlags::SAMPLED | vk::ImageUsageFlags::TRANSFER_SRC;
     let desc = ImageDesc::new(name, vk::Format::R32G32B32A32_SFLOAT, [width, height, 1], usage);
-    Image::new(build, ImageDesc { layers: Some(layers as u32), levels, ..desc })
+    ImageDesc { layers: Some(layers as u32), levels, ..desc }
+}
+
+fn image(build: &mut Build<'_>, name: &'static str, size: [u32; 2], layers: usize, levels: u32) -> Result<Image> {
+    Image::new(build, desc(name, size, layers, levels))
 }
 
 /// The sizes of the arrays for moments of the sizes `wanted`; each of these fits one.
@@ -198,12 +223,17 @@ pub(crate) struct Work {
     sets: Sets,
 }
 
-pub(crate) struct BrdfMap(ComputePipeline);
+pub(crate) struct BrdfMap {
+    pipeline: ComputePipeline,
+    /// Whether what is in the second image of a group are cells.
+    divides: bool,
+}
 
 impl BrdfMap {
     pub fn new(p: &mut PassContext<'_, '_>, config: &Config) -> Result<Self> {
         let constants = [number(config.filter), u32::from(config.takes_lobes_literally())];
-        Ok(Self(ComputePipeline::new(p.build, p.modules, &INTERFACE, p.bridge, 0, &constants)?))
+        let pipeline = ComputePipeline::new(p.build, p.modules, &INTERFACE, p.bridge, 0, &constants)?;
+        Ok(Self { pipeline, divides: config.filter.has_cells() })
     }
 
     /// What the recording needs: `groups` of which the images are `classes`, from `first` on, as [`Group::images`] has them.
@@ -215,7 +245,7 @@ impl BrdfMap {
         classes: &[&Image],
         first: usize,
     ) -> Result<Work> {
-        let sets = self.0.sets(build, groups.iter().map(|g| g.sources.len()).sum())?;
+        let sets = self.pipeline.sets(build, groups.iter().map(|g| g.sources.len()).sum())?;
         let (mut arrays, mut pushes, mut class) = (Vec::new(), Vec::new(), first);
         for group in groups {
             let views = classes[class].level_views(build)?;
@@ -226,7 +256,8 @@ impl BrdfMap {
                 pushes.push((class, Push::of(source, layers)));
             }
             let cells = class + 1;
-            let of_cells = if group.layers.cells > 0 { Some((cells, classes[cells].level_views(build)?)) } else { None };
+            let divides = self.divides && group.layers.cells > 0;
+            let of_cells = if divides { Some((cells, classes[cells].level_views(build)?)) } else { None };
             arrays.push(Arrays { moments: (class, views), cells: of_cells });
             class += 1 + usize::from(group.layers.cells > 0);
         }
@@ -239,14 +270,14 @@ impl BrdfMap {
         work.arrays.iter().for_each(|a| rec.overwrite(io.maps.class(a.moments.0), Access::COMPUTE_WRITE));
         rec.flush();
         for ((class, push), set) in work.pushes.iter().zip(&work.sets.sets) {
-            self.0.bind_set(rec, *set, push);
-            self.0.dispatch(rec, io.maps.class(*class).extent());
+            self.pipeline.bind_set(rec, *set, push);
+            self.pipeline.dispatch(rec, io.maps.class(*class).extent());
         }
         rec.end();
     }
 
     pub fn retire(self, bag: &mut Retired) {
-        self.0.retire(bag);
+        self.pipeline.retire(bag);
     }
 }
 

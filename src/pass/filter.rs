@@ -41,6 +41,7 @@ pub const INTERFACE: Interface = Interface {
         D::STORAGE_IMAGE,
         D::STORAGE_IMAGE,
         D::STORAGE_BUFFER,
+        D::STORAGE_BUFFER,
     ],
 };
 
@@ -63,7 +64,8 @@ pub(crate) struct Io<'a> {
 pub(crate) struct Filter(ComputePipeline);
 
 impl Filter {
-    pub fn new(p: &mut PassContext<'_, '_>, config: &Config, uses: Uses) -> Result<Self> {
+    /// `clusters` is the most that a material has, at least 1.
+    pub fn new(p: &mut PassContext<'_, '_>, config: &Config, uses: Uses, clusters: u32) -> Result<Self> {
         let [albedo, specular, normal, roughness, moments, cells] = uses;
         let (geometric, filter) = (u32::from(config.widened()), config.filter);
         let lengths = match config.division {
@@ -72,7 +74,7 @@ impl Filter {
         };
         let [one, quarters] = lengths.map(f32::to_bits);
         let read = [config.anisotropy, config.lod_bias.to_bits(), u32::from(config.takes_lobes_literally()), one, quarters];
-        let read = read.into_iter().chain([u32::from(config.bins == Bins::Camera)]);
+        let read = read.into_iter().chain([u32::from(config.bins == Bins::Camera), clusters]);
         let lobes = [brdf_map::number(filter), filter.lobe_layers()].into_iter().chain(read);
         let constants = [albedo, specular, normal, roughness, geometric, moments, cells];
         let constants: Vec<_> = constants.into_iter().chain(lobes).collect();
@@ -93,6 +95,7 @@ impl Filter {
         resources.extend((0..MAX_CLASSES).map(|i| Resource::Sampled(class(i), io.samplers.tiled)));
         resources.extend([io.normals, io.factors, io.lobes].map(|image| Resource::Storage(image.view)));
         resources.push(Resource::Buffer(io.objects.map_or(io.maps.records(), ObjectCells::table)));
+        resources.push(Resource::Buffer(io.maps.clusters()));
         self.0.bind(rec, io.bridge, &resources, &());
         self.0.dispatch(rec, io.normals.extent());
         rec.end();

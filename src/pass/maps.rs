@@ -2,6 +2,7 @@
 
 use crate::config::Bins;
 use crate::distribution::effective::Rule;
+use crate::distribution::filter::Storage;
 use crate::distribution::{Filter, MOST_BASE_LOBES};
 use crate::error::{Error, Result};
 use crate::gpu::access::Access;
@@ -14,6 +15,8 @@ use crate::gpu::upload::{BufferUpload, ImageUpload};
 use crate::material::{Material, Roughness};
 use crate::moments::{Base, BaseLobes, Parameter};
 use crate::pass::brdf_map::{self, BrdfMap, Group, Layers, Place, Source};
+use crate::pass::cluster_moments::{self, ClusterMoments};
+use crate::pass::kept::{self, Table};
 use crate::pass::vmf_mips::{self, VmfMips};
 use crate::reflectance::Model;
 use crate::texture::classes::MAX_CLASSES;
@@ -40,11 +43,20 @@ struct Record {
     upright: u32,
     concentration: f32,
     facing: f32,
+    clusters: [u32; 4],
 }
+
+/// The passes over the maps of materials: the last if the filter has clusters.
+pub(crate) type MomentPasses = (BrdfMap, VmfMips, Option<ClusterMoments>);
+
+/// What their recordings need.
+pub(crate) type MomentWork = (brdf_map::Work, vmf_mips::Work, Option<cluster_moments::Work>);
 
 /// What the `filter` pass reads.
 pub(crate) struct MapImages {
     records: Buffer,
+    /// Of all materials.
+    clusters: Buffer,
     /// Textures, and behind them moments.
     classes: Vec<Image>,
     /// Where each material's moments are.
@@ -87,21 +99,46 @@ pub(crate) struct Reading<'a> {
     /// Whether the mesh's curvature widens lobes.
     pub widened: bool,
     /// There if the filter stores moments.
-    pub passes: Option<&'a (BrdfMap, VmfMips)>,
+    pub passes: Option<&'a MomentPasses>,
     pub samplers: &'a Samplers,
 }
 
 /// Created and filled, not yet recorded.
 pub(crate) struct MapsUpload {
     records: BufferUpload,
+    clusters: BufferUpload,
     classes: Vec<ImageUpload>,
-    moments: Vec<Image>,
+    moments: Vec<Made>,
     places: Vec<Option<MomentsPlace>>,
     divided: Vec<Option<Divided>>,
     /// Of each material, whether the filter finds its lobes.
     pub found: Vec<bool>,
     pub uses: Uses,
-    pub work: Option<(brdf_map::Work, vmf_mips::Work)>,
+    /// The most clusters that a material has, at least 1.
+    pub most_clusters: u32,
+    pub work: Option<MomentWork>,
+}
+
+/// An image behind the textures: written by the passes, or filled.
+enum Made {
+    Written(Image),
+    Filled(ImageUpload),
+}
+
+impl Made {
+    fn image(&self) -> &Image {
+        match self {
+            Self::Written(image) => image,
+            Self::Filled(upload) => &upload.image,
+        }
+    }
+
+    fn record(self, rec: &mut Recorder<'_>, bag: &mut Retired) -> Image {
+        match self {
+            Self::Written(image) => image,
+            Self::Filled(upload) => upload.record(rec, bag),
+        }
+    }
 }
 
 /// How the shader turns a roughness map's value into alpha, and the greatest alpha that comes of it.
@@ -162,21 +199,48 @@ fn groups(
     bases: &[Option<Base>],
     sizes: Vec<[u32; 2]>,
     slots: &[Slots],
+    clusters: &[[u32; 2]],
     reading: &Reading<'_>,
 ) -> (Vec<Group>, Vec<Option<GroupPlace>>) {
     let mut groups: Vec<_> = sizes.into_iter().map(Group::new).collect();
-    let mut place = |((material, base), slots): ((&Material, &Option<Base>), &Slots)| {
-        let base = (*base)?;
+    let mut place = |i: usize| {
+        let (material, base, slots, clusters) = (materials.get(i)?, (*bases.get(i)?)?, slots.get(i)?, clusters.get(i)?);
         let group = brdf_map::fitting(&groups, base.size(material))?;
         let roughness = base.roughness(material).and(slots.roughness);
         let parameter = Parameter::of(&material.model);
-        let source = Source { normal: slots.normal, roughness, rule: rule(material), base, parameter };
-        let layers = Layers::of(reading.filter, &base);
+        let source = Source { normal: slots.normal, roughness, rule: rule(material), base, parameter, clusters: *clusters };
+        let layers = Layers::of(reading.filter, &base, clusters[1]);
         let cells = if reading.bins == Bins::Camera { 0 } else { layers.cells };
         Some(GroupPlace { group, first: groups.get_mut(group)?.place(source, Layers { cells, ..layers }), layers })
     };
-    let places = materials.iter().zip(bases).zip(slots).map(&mut place).collect();
+    let places = (0..materials.len()).map(&mut place).collect();
     (groups, places)
+}
+
+/// The images of `groups` that are filled from the host: of peaks, if the filter has some.
+fn filled(
+    build: &mut Build<'_>,
+    materials: &[Material],
+    groups: &[Group],
+    places: &[Option<GroupPlace>],
+    filter: Filter,
+) -> Result<Vec<Option<ImageUpload>>> {
+    let Some(Storage::Peaks(count)) = filter.storage() else { return Ok(groups.iter().map(|_| None).collect()) };
+    let mut image = |(i, group): (usize, &Group)| {
+        if group.layers.cells == 0 {
+            return Ok(None);
+        }
+        let here = |(material, place): (_, &Option<GroupPlace>)| {
+            let place = place.as_ref().filter(|place| place.group == i && place.layers.cells > 0)?;
+            Some((material, place.first.cells))
+        };
+        let mut sources: Vec<(&Material, usize)> = materials.iter().zip(places).filter_map(here).collect();
+        sources.sort_by_key(|source| source.1);
+        sources.dedup_by_key(|source| source.1);
+        let desc = brdf_map::coarser_desc(filter, group.size, group.layers.cells);
+        Ok(Some(ImageUpload::new(build, desc, &kept::peaks(&desc, group.size, count, &sources))?))
+    };
+    groups.iter().enumerate().map(&mut image).collect()
 }
 
 /// Of each of `materials` what has to be known of it to make the cells of an object of it. Moments and cells of `groups` are behind
@@ -206,8 +270,13 @@ fn divided(
 }
 
 impl Record {
-    /// Of a material whose `lobes` are filtered, and the codes of its maps, its moments and its cells.
-    fn of(material: &Material, lobes: &Base, [albedo, specular, normal, roughness, moments, cells]: [u32; 6]) -> Self {
+    /// Of a material whose `lobes` are filtered, its clusters, and the codes of its maps, its moments and its cells.
+    fn of(
+        material: &Material,
+        lobes: &Base,
+        [first, clusters]: [u32; 2],
+        [albedo, specular, normal, roughness, moments, cells]: [u32; 6],
+    ) -> Self {
         let own = lobes.lobes();
         Self {
             places: [albedo, specular, normal, roughness],
@@ -222,6 +291,7 @@ impl Record {
             upright: u32::from(lobes.upright()),
             concentration: own.first().map_or(0.0, |lobe| lobe.kappa as f32),
             facing: lobes.facing() as f32,
+            clusters: [first, clusters, 0, 0],
         }
     }
 }
@@ -232,15 +302,17 @@ impl MapsUpload {
         let base = |material| if filters { Base::of(material, reading.rule) } else { None };
         let bases: Vec<_> = materials.iter().map(base).collect();
         let wanted = materials.iter().zip(&bases).filter_map(|(m, base)| Some(base.as_ref()?.size(m)));
-        let sizes = brdf_map::sizes(wanted, reading.filter.has_cells());
-        let arrays = sizes.len() * (1 + usize::from(reading.filter.has_cells()));
+        let sizes = brdf_map::sizes(wanted, reading.filter.has_coarser());
+        let arrays = sizes.len() * (1 + usize::from(reading.filter.has_coarser()));
         let Classes { mut classes, slots } = Classes::within(materials, MAX_CLASSES - arrays);
         if classes.is_empty() {
             // Something to bind.
             let texel = std::sync::Arc::new(crate::Texture::scalar([1, 1], &[0.0])?);
             classes.push(Class { size: [1, 1], format: Format::Half1, layers: vec![texel] });
         }
-        let (groups, places) = groups(materials, &bases, sizes, &slots, reading);
+        let table = Table::of(materials, &bases, reading.filter);
+        let (groups, places) = groups(materials, &bases, sizes, &slots, &table.of, reading);
+        let filled = filled(build, materials, &groups, &places, reading.filter)?;
         let camera = reading.bins == Bins::Camera;
         // Cells are behind the moments of their group, those of objects behind all.
         let firsts: Vec<_> = groups
@@ -258,7 +330,7 @@ impl MapsUpload {
         let divided = if camera { divided(materials, &bases, &places, &groups, classes.len())? } else { Vec::new() };
         let (mut uses, mut found) = (Uses::default(), Vec::new());
         let mut records = Vec::with_capacity(materials.len());
-        for (((material, slots), base), place) in materials.iter().zip(slots).zip(bases).zip(&places) {
+        for ((((material, slots), base), place), clusters) in materials.iter().zip(slots).zip(bases).zip(&places).zip(&table.of) {
             let (moments, cells) = (place.map(|p| p.moments.0), place.and_then(|p| p.cells.map(|c| c.0)));
             let mut slots = [slots.albedo, slots.specular, slots.normal, slots.roughness, moments, cells];
             if let Some(base) = base {
@@ -273,39 +345,48 @@ impl MapsUpload {
                 BaseLobes::of(&material.model, reading.rule).filter(|own| filters && own.upright() && own.lobes().len() == 1);
             let lobes = base.or(lone.map(Base::Lobes)).unwrap_or(Base::Normals);
             found.push(!lobes.lobes().is_empty());
-            records.push(Record::of(material, &lobes, slots.map(code)));
+            records.push(Record::of(material, &lobes, *clusters, slots.map(code)));
         }
         let classes = classes.iter().map(|class| upload(build, class)).collect::<Result<Vec<_>>>()?;
+        let usage = vk::BufferUsageFlags::STORAGE_BUFFER;
+        let clusters = BufferUpload::new(build, "clusters", usage, bytemuck::cast_slice(&table.records))?;
         let mut moments = Vec::new();
-        for group in &groups {
-            moments.extend(group.images(build, reading.filter)?);
+        for (group, filled) in groups.iter().zip(filled) {
+            moments.extend(group.images(build, reading.filter, filled.is_some())?.into_iter().map(Made::Written));
+            moments.extend(filled.map(Made::Filled));
         }
         let work = match reading.passes.filter(|_| !groups.is_empty()) {
-            Some((map, mips)) => {
-                let images: Vec<_> = classes.iter().map(|c| &c.image).chain(&moments).collect();
+            Some((map, mips, by_clusters)) => {
+                let images: Vec<_> = classes.iter().map(|c| &c.image).chain(moments.iter().map(Made::image)).collect();
                 let map = map.prepare(build, reading.samplers, &groups, &images, classes.len())?;
                 let mips = mips.prepare(build, &groups, &map)?;
-                Some((map, mips))
+                let prepare = |pass: &ClusterMoments| pass.prepare(build, &groups, &images, &map, &clusters.buffer);
+                let by_clusters = by_clusters.as_ref().map(prepare).transpose()?;
+                Some((map, mips, by_clusters))
             }
             None => None,
         };
-        let usage = vk::BufferUsageFlags::STORAGE_BUFFER;
         let records = BufferUpload::new(build, "maps", usage, bytemuck::cast_slice(&records))?;
-        Ok(Self { records, classes, moments, places, divided, found, uses, work })
+        let most_clusters = table.most();
+        Ok(Self { records, clusters, classes, moments, places, divided, found, uses, most_clusters, work })
     }
 
     pub fn record(self, rec: &mut Recorder<'_>, bag: &mut Retired) -> MapImages {
         let textures = self.classes.into_iter().map(|class| class.record(rec, bag));
         let mut classes: Vec<_> = textures.collect();
-        classes.extend(self.moments);
-        let records = self.records.record(rec, bag);
-        MapImages { records, classes, moments: self.places, divided: self.divided }
+        classes.extend(self.moments.into_iter().map(|made| made.record(rec, bag)));
+        let (records, clusters) = (self.records.record(rec, bag), self.clusters.record(rec, bag));
+        MapImages { records, clusters, classes, moments: self.places, divided: self.divided }
     }
 }
 
 impl MapImages {
     pub fn records(&self) -> &Buffer {
         &self.records
+    }
+
+    pub fn clusters(&self) -> &Buffer {
+        &self.clusters
     }
 
     /// The array of class `i`, or of the last if there are not that many.
@@ -330,12 +411,15 @@ impl MapImages {
     /// Declares everything read by the pass that is open.
     pub fn sampled(&self, rec: &mut Recorder<'_>) {
         rec.buffer(&self.records, Access::COMPUTE_READ);
+        rec.buffer(&self.clusters, Access::COMPUTE_READ);
         self.classes.iter().for_each(|class| rec.image(class, Access::COMPUTE_SAMPLED));
     }
 
     pub fn retire(self, states: &mut States, bag: &mut Retired) {
-        states.forget(self.records.handle);
-        self.records.retire(bag);
+        for buffer in [self.records, self.clusters] {
+            states.forget(buffer.handle);
+            buffer.retire(bag);
+        }
         for class in self.classes {
             states.forget(class.handle);
             class.retire(bag);

@@ -14,8 +14,7 @@ use crate::gpu::sampler::Samplers;
 use crate::gpu::upload::{BufferUpload, ImageUpload};
 use crate::material::{MOST_KERNEL, Material};
 use crate::pass::fits::Packed;
-use crate::pass::maps::{MapImages, MapsUpload, Reading, Uses};
-use crate::pass::{brdf_map, vmf_mips};
+use crate::pass::maps::{MapImages, MapsUpload, MomentWork, Reading, Uses};
 use crate::reflectance::ladder::{Ladder, own_square};
 use crate::reflectance::merl::{PHI_DIFF, THETA_DIFF, THETA_HALF};
 use crate::reflectance::{Lobe, MerlTable, Model, atlas, bandwidth};
@@ -310,8 +309,13 @@ impl MaterialsUpload {
         self.maps.uses
     }
 
+    /// The most clusters that a material has, at least 1.
+    pub fn most_clusters(&self) -> u32 {
+        self.maps.most_clusters
+    }
+
     /// The sets of the passes over the maps, which run after [`Self::record`].
-    pub fn work(&mut self) -> Option<(brdf_map::Work, vmf_mips::Work)> {
+    pub fn work(&mut self) -> Option<MomentWork> {
         self.maps.work.take()
     }
 

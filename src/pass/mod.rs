@@ -6,12 +6,14 @@ pub mod bandwidth;
 pub mod base;
 pub mod brdf_map;
 pub mod classify;
+pub mod cluster_moments;
 pub mod curvature;
 pub mod environment;
 pub mod environment_bandwidth;
 pub mod filter;
 pub(crate) mod fits;
 pub mod gbuffer;
+pub(crate) mod kept;
 pub(crate) mod level;
 pub mod luminance;
 pub(crate) mod maps;
@@ -67,5 +69,6 @@ pub fn interfaces() -> Vec<Interface> {
     all.extend(luminance::INTERFACES);
     all.extend(prefilter::INTERFACES);
     all.extend([brdf_map::INTERFACE, vmf_mips::CELLS, vmf_mips::INTERFACE]);
+    all.extend([cluster_moments::INTERFACE, cluster_moments::LEVELS]);
     all
 }

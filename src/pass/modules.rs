@@ -23,6 +23,8 @@ modules! {
     "brdf_map.comp",
     "vmf_mips.cells.comp",
     "vmf_mips.comp",
+    "cluster_moments.comp",
+    "cluster_moments.levels.comp",
     "filter.comp",
     "curvature.comp",
     "bandwidth.blocks.comp",

@@ -1,6 +1,7 @@
 //! Cells of directions that each object has of its own, in camera space: where they are, and the images that `texture_space` and
 //! `vmf_mips` write in every frame (Xu et al. 2017, section 4).
 
+use crate::distribution::Filter;
 use crate::error::{Error, Result};
 use crate::gpu::access::Access;
 use crate::gpu::buffer::Buffer;
@@ -100,7 +101,7 @@ impl Images {
         let desc = ImageDesc::new("frames", FRAMES, [of.size[0], of.size[1], 1], usage);
         let frames = Image::new(build, ImageDesc { layers: Some(objects as u32), ..desc })?;
         let frame_views = frames.layer_views(build)?;
-        let cells = brdf_map::cells(build, of.size, layers)?;
+        let cells = brdf_map::coarser(build, Filter::Vmf8, of.size, layers)?;
         let mut views = cells.level_views(build)?;
         let moments = maps.class(of.moments).level_views(build)?;
         let lobes = moments.first().copied().unwrap_or_default();

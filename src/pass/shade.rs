@@ -102,13 +102,15 @@ pub(crate) struct Shade {
 
 /// Constants of `glsl/include/lobes.glsl` and `approximation.glsl`, and whether there are materials whose lobes the filter does not
 /// find.
-pub(crate) fn lobe_constants(config: &Config, kinds: Kinds) -> [u32; 7] {
+pub(crate) fn lobe_constants(config: &Config, kinds: Kinds) -> [u32; 8] {
     let layers = config.filter.lobe_layers();
     let slopes = config.filter.has_slopes();
     let smith = config.filter == Filter::Leadr;
+    let elliptic = config.filter.is_elliptic();
     let of_kinds = [kinds.unfiltered, kinds.fitted, kinds.reflected].map(u32::from);
-    let [unfiltered, fitted, reflected] = of_kinds;
-    [layers.max(1), u32::from(layers > 0), u32::from(slopes), u32::from(smith), unfiltered, fitted, reflected]
+    let of_filter = [layers > 0, slopes, smith].map(u32::from);
+    let ([lobed, slopes, smith], [unfiltered, fitted, reflected]) = (of_filter, of_kinds);
+    [layers.max(1), lobed, slopes, smith, unfiltered, u32::from(elliptic), fitted, reflected]
 }
 
 impl Shade {

@@ -32,10 +32,11 @@ pub struct Args {
     /// What to measure
     #[arg(long)]
     suite: Suite,
-    /// How much of it: few scenes at 256x256, or all at 512x512; of xu two at 128x128, or all at 256x256 and in motion
+    /// How much of it: few scenes at 256x256, or all at 512x512; of xu and tan some at 128x128, or all at 256x256 and in
+    /// motion
     #[arg(long, default_value = "quick")]
     preset: Preset,
-    /// Timed frames of each variant [default: 5 of quick, 9 of full; of xu 3 and 7]
+    /// Timed frames of each variant [default: 5 of quick, 9 of full; of xu and tan 3 and 7]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=10_000))]
     rounds: Option<u32>,
     /// Image size [default: the scene's, else the preset's]
@@ -51,7 +52,7 @@ pub struct Args {
     #[arg(long, value_name = "FOLDER")]
     plots: Option<PathBuf>,
     /// Write figures into this folder: of bagher those of Bagher et al. 2011 (6, 11, 12, 14 and 15), of each scene of the quick
-    /// preset or named here; of xu the truth beside every filter, of each scene
+    /// preset or named here; of xu and tan the truth beside every filter, of each scene
     #[arg(long, value_name = "FOLDER")]
     figures: Option<PathBuf>,
     /// Write a page to look at
@@ -114,10 +115,11 @@ impl Args {
         Options { device: self.device.clone(), validate: false }
     }
 
-    /// Of the suite xu.
-    fn filters(&self) -> Result<xu::Order> {
-        later(self.plots.is_some(), "--plots of --suite xu")?;
+    /// Of the suites of filters.
+    fn filters(&self, suite: xu::Suite) -> Result<xu::Order> {
+        later(self.plots.is_some(), "--plots of --suite xu and tan")?;
         Ok(xu::Order {
+            suite,
             preset: self.preset(),
             rounds: self.rounds,
             extent: self.size,
@@ -134,7 +136,7 @@ impl Args {
             Suite::Bagher => suites::Suite::Bagher,
             Suite::Residual => suites::Suite::Residual,
             Suite::Xu | Suite::Tan | Suite::Joined | Suite::Scaling | Suite::All => {
-                return Err(Error::NotSupportedYet { what: "--suite tan, joined, scaling and all".into() });
+                return Err(Error::NotSupportedYet { what: "--suite joined, scaling and all".into() });
             }
         };
         let pictured = self.plots.is_some() || self.figures.is_some();
@@ -167,7 +169,8 @@ enum Order {
 pub fn run(args: &Args) -> Result<ExitCode> {
     args.check()?;
     let order = match args.suite {
-        Suite::Xu => Order::Filters(args.filters()?),
+        Suite::Xu => Order::Filters(args.filters(xu::Suite::Xu)?),
+        Suite::Tan => Order::Filters(args.filters(xu::Suite::Tan)?),
         _ => Order::Rates(args.order()?),
     };
     // Before the work, not after it.

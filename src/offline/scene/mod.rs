@@ -76,6 +76,12 @@ impl Scene {
         &self.name
     }
 
+    /// The same with another name.
+    pub(crate) fn called(mut self, name: &str) -> Self {
+        self.name = name.into();
+        self
+    }
+
     /// Loads every file that the scene names, and makes what it takes from formulas: the world in its first frame.
     ///
     /// # Errors

@@ -19,17 +19,26 @@ const RIVAL: &str = "toksvig-lobe";
 const LOBED: &[&str] = &["cloth-plane", "bumps-plane", "disk-plane"];
 const SMOOTH: &[&str] = &["dunes-plane"];
 
+/// An aim of those of `scenes` of which `of` finds something, judged where it is worst.
+pub(super) fn worst(
+    scenes: &[SceneReport],
+    what: String,
+    aim: f64,
+    at_least: bool,
+    of: &dyn Fn(&SceneReport) -> Option<f64>,
+) -> Option<Target> {
+    let name = |scene: &SceneReport| format!("{} {}", scene.scene, scene.light.name());
+    let found: Vec<(String, SpeedUp)> =
+        scenes.iter().filter_map(|scene| Some((name(scene), SpeedUp { factor: of(scene)?, is: Is::Found }))).collect();
+    let mut sorted: Vec<(&str, SpeedUp)> = found.iter().map(|(name, found)| (name.as_str(), *found)).collect();
+    sorted.sort_by(|a, b| a.1.factor.total_cmp(&b.1.factor));
+    let worst = if at_least { sorted.first() } else { sorted.last() }?.1;
+    Target::new(what, &sorted, worst, aim, at_least)
+}
+
 /// Of all scenes: each is judged where it is worst.
 pub(super) fn targets(scenes: &[SceneReport]) -> Vec<Target> {
-    let worst = |what: String, aim: f64, at_least: bool, of: &dyn Fn(&SceneReport) -> Option<f64>| {
-        let name = |scene: &SceneReport| format!("{} {}", scene.scene, scene.light.name());
-        let found: Vec<(String, SpeedUp)> =
-            scenes.iter().filter_map(|scene| Some((name(scene), SpeedUp { factor: of(scene)?, is: Is::Found }))).collect();
-        let mut sorted: Vec<(&str, SpeedUp)> = found.iter().map(|(name, found)| (name.as_str(), *found)).collect();
-        sorted.sort_by(|a, b| a.1.factor.total_cmp(&b.1.factor));
-        let worst = if at_least { sorted.first() } else { sorted.last() }?.1;
-        Target::new(what, &sorted, worst, aim, at_least)
-    };
+    let worst = |what, aim, at_least, of: &dyn Fn(&SceneReport) -> Option<f64>| worst(scenes, what, aim, at_least, of);
     let errors = |light: Light, names: &'static [&'static str], aim: f64| {
         let what = format!("rel_l2, less noise, of {FINEST} over {RIVAL}'s on {}, {}", names.join(", "), light.name());
         worst(what, aim, false, &move |scene| {
@@ -57,7 +66,7 @@ pub(super) fn targets(scenes: &[SceneReport]) -> Vec<Target> {
     all.into_iter().flatten().collect()
 }
 
-fn ratio(a: f64, b: f64) -> Option<f64> {
+pub(super) fn ratio(a: f64, b: f64) -> Option<f64> {
     Some(a / b).filter(|r| r.is_finite())
 }
 

@@ -2,7 +2,7 @@
 
 use crate::offline::bench::report::Skipped;
 use crate::offline::bench::suites::Preset;
-use crate::offline::bench::xu::{Order, under};
+use crate::offline::bench::xu::{Order, Suite, under};
 use crate::offline::builtin;
 use crate::offline::error::Result;
 use crate::offline::scene::Scene;
@@ -54,12 +54,40 @@ const CASES: [Case; 13] = [
     fetched("dragon-normals", "scenes/dragon-normals.toml", "assets/dragon_res3.ply.gz", "dragon"),
 ];
 
+/// A plane of [`TAN`] further away: its maps repeat so many times as often.
+struct Distance {
+    scene: &'static str,
+    times: u32,
+    /// Whether the quick preset has it.
+    quick: bool,
+}
+
+const fn far(scene: &'static str, times: u32, quick: bool) -> Distance {
+    Distance { scene, times, quick }
+}
+
+/// The kinds of surface of Tan et al. 2005: a carved disk in several zooms, armour of hemispherical scales at two resolutions, and
+/// dunes at several distances.
+const TAN: [Distance; 8] = [
+    far("disk-plane", 1, true),
+    far("disk-plane", 2, false),
+    far("disk-plane", 4, false),
+    far("bumps-plane", 1, true),
+    far("bumps-plane", 4, false),
+    far("dunes-plane", 1, true),
+    far("dunes-plane", 3, false),
+    far("dunes-plane", 8, false),
+];
+
 /// The environment of scenes without one.
 const ENVIRONMENT: &str = "sun-sky";
 
 /// The scenes of the order's preset; those that lack files are `skipped`.
 pub(super) fn scenes(order: &Order, skipped: &mut Vec<Skipped>) -> Result<Vec<Scene>> {
     let mut scenes = Vec::new();
+    if order.suite == Suite::Tan {
+        return TAN.iter().filter(|case| case.quick || order.preset == Preset::Full).map(Distance::scene).collect();
+    }
     for case in CASES.iter().filter(|case| case.quick || order.preset == Preset::Full) {
         match case.file {
             None => scenes.push(Scene::load(case.name, &[])?),
@@ -70,6 +98,18 @@ pub(super) fn scenes(order: &Order, skipped: &mut Vec<Skipped>) -> Result<Vec<Sc
         }
     }
     Ok(scenes)
+}
+
+impl Distance {
+    fn scene(&self) -> Result<Scene> {
+        let near = Scene::load(self.scene, &[])?;
+        if self.times == 1 {
+            return Ok(near);
+        }
+        let [u, v] = near.resolve()?.materials.first().map_or([1.0; 2], |m| m.maps.tiling.map(|t| t * self.times as f32));
+        let tiling = ("materials.surface.tiling".to_string(), format!("[{u}, {v}]"));
+        Ok(Scene::load(self.scene, &[tiling])?.called(&format!("{} x{}", self.scene, self.times)))
+    }
 }
 
 impl Light {
@@ -130,5 +170,10 @@ mod tests {
         }
         let names: std::collections::BTreeSet<_> = CASES.iter().map(|c| c.name).collect();
         assert_eq!(names.len(), CASES.len());
+        let tiling = |case: &Distance| case.scene().unwrap().resolve().unwrap().materials[0].maps.tiling;
+        for case in &TAN {
+            let near = far(case.scene, 1, true);
+            assert_eq!(tiling(case), tiling(&near).map(|t| t * case.times as f32), "{}", case.scene);
+        }
     }
 }

@@ -1,7 +1,8 @@
-//! The suite xu: every filter against the truth, under a point light and under an environment, and what each costs (Xu et al.
-//! 2017, table 1, figures 1, 2 and 4 to 6).
+//! The suites xu and tan: every filter against the truth, under a point light and under an environment, and what each costs (Xu et
+//! al. 2017, table 1, figures 1, 2 and 4 to 6; Tan et al. 2005, section 5).
 
 mod aims;
+mod aims_tan;
 pub mod cases;
 pub mod motion;
 pub mod report;
@@ -27,9 +28,30 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 use truths::Truths;
 
+/// Whose scenes and aims.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Suite {
+    /// Of Xu et al. 2017, on the pinned inputs.
+    Xu,
+    /// Of Tan et al. 2005: the same surfaces at several scales.
+    Tan,
+}
+
+impl Suite {
+    /// As `--suite` names it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Xu => "xu",
+            Self::Tan => "tan",
+        }
+    }
+}
+
 /// What to run.
 #[derive(Clone, Debug)]
 pub struct Order {
+    /// Which of the suites.
+    pub suite: Suite,
     /// How much of it.
     pub preset: Preset,
     /// Timed frames of each filter; the preset's without.
@@ -86,7 +108,7 @@ const MARGIN: f64 = 10.0;
 pub fn run(order: &Order, mut keep: Option<&mut Keep<'_>>, progress: &mut Progress<'_>) -> Result<Report> {
     let clock = Instant::now();
     let mut report = Report {
-        head: Head::new("xu", order.preset.name(), order.rounds.unwrap_or(order.preset.frames_timed())),
+        head: Head::new(order.suite.name(), order.preset.name(), order.rounds.unwrap_or(order.preset.frames_timed())),
         scenes: Vec::new(),
         skipped: Vec::new(),
         targets: Vec::new(),
@@ -105,7 +127,12 @@ pub fn run(order: &Order, mut keep: Option<&mut Keep<'_>>, progress: &mut Progre
             report.scenes.push(found);
         }
     }
-    report.targets = aims::targets(&report.scenes);
+    report.targets = match order.suite {
+        Suite::Xu => aims::targets(&report.scenes),
+        Suite::Tan => Vec::new(),
+    };
+    // Those of clusters are of any scenes.
+    report.targets.extend(aims_tan::targets(&report.scenes));
     report.seconds.total = clock.elapsed().as_secs_f64();
     Ok(report)
 }

@@ -79,9 +79,12 @@ pub(super) fn flicker(
         // The difference of halves has twice the spread of their mean.
         noise[which] = of(&halves[0], &halves[1])? / 2.0;
         for (done, ((filter, row), found)) in (1..).zip(Filter::ALL.into_iter().zip(rows.iter()).zip(&mut found)) {
+            // What is drawn anew in each frame flickers by that.
             let session = match row.refused {
-                None => open(&stage.world, &stage.config(filter, extent, DIRECTIONS), stage.device())?.ok(),
-                Some(_) => None,
+                None if !filter.is_random() => {
+                    open(&stage.world, &stage.config(filter, extent, DIRECTIONS), stage.device())?.ok()
+                }
+                _ => None,
             };
             if let Some(mut session) = session {
                 let mut world = stage.world.clone();
@@ -97,8 +100,8 @@ pub(super) fn flicker(
             told("moving frames", done, Filter::ALL.len() as u64);
         }
     }
-    for (row, [zoom, orbit]) in rows.iter_mut().zip(found).filter(|(row, _)| row.refused.is_none()) {
-        row.flicker = Some(Flicker { zoom, orbit });
+    for ((row, filter), [zoom, orbit]) in rows.iter_mut().zip(Filter::ALL).zip(found) {
+        row.flicker = (row.refused.is_none() && !filter.is_random()).then_some(Flicker { zoom, orbit });
     }
     let [zoom, orbit] = noise;
     Ok(Flicker { zoom, orbit })

@@ -15,8 +15,8 @@ use crate::{Config, Estimator, Filter};
 const DIRECTIONS: u32 = 256;
 /// The error over the noise that is low enough.
 const MARGIN: f64 = 10.0;
-/// Frames after which it is as it is.
-const MOST_FRAMES: u32 = 8;
+/// Frames after which it is as it is; of a filter that draws lobes, which need more.
+const MOST_FRAMES: [u32; 2] = [8, 64];
 /// A pixel is judged if it is covered by this much: of truths, whose sums are rounded.
 const WHOLE: f32 = 0.9999;
 /// Of frames, whose numbers tell them from those that are timed.
@@ -51,7 +51,7 @@ pub(super) fn take(
         let config = stage.config(filter, extent, DIRECTIONS);
         match open(&stage.world, &config, stage.device())? {
             Ok(mut session) => {
-                let (picture, frames, noise) = average(stage, &mut session, (&reference.0, &reference.1))?;
+                let (picture, frames, noise) = average(stage, filter, &mut session, (&reference.0, &reference.1))?;
                 row.lobes = lobes(&mut session, &config)?;
                 let preconvolved = match stage.light {
                     Light::Point => None,
@@ -69,10 +69,15 @@ pub(super) fn take(
 }
 
 /// The mean of enough frames, how many they are, and their noise as a part of the mean.
-fn average(stage: &Stage<'_>, session: &mut Session, (truth, mask): (&Picture, &[bool])) -> Result<(Picture, u32, f64)> {
+fn average(
+    stage: &Stage<'_>,
+    filter: Filter,
+    session: &mut Session,
+    (truth, mask): (&Picture, &[bool]),
+) -> Result<(Picture, u32, f64)> {
     session.frame([SEED, 0])?;
     let first = Frame::read(session)?.picture;
-    if stage.light == Light::Point {
+    if stage.light == Light::Point && !filter.is_random() {
         return Ok((first, 1, 0.0));
     }
     let mut halves = [sums(&first), vec![[0.0; 3]; first.rgb.len()]];
@@ -95,7 +100,7 @@ fn average(stage: &Stage<'_>, session: &mut Session, (truth, mask): (&Picture, &
         let whole = mean(&|i| [0, 1, 2].map(|c| halves[0][i][c] + halves[1][i][c]), frames);
         let noise = finite(quality::noise([&a, &b], mask)?.rel_l2, "the noise of a still")?;
         let error = quality::error(&[Frame { picture: whole.clone(), coverage: Vec::new() }], truth, mask)?.rel_l2;
-        if frames >= MOST_FRAMES || noise * MARGIN <= error {
+        if frames >= MOST_FRAMES[usize::from(filter.is_random())] || noise * MARGIN <= error {
             return Ok((whole, frames, noise));
         }
     }

@@ -1,0 +1,99 @@
+//! What filters keep of materials beside averages, made on the host once a set of materials: the table of clusters, and the texels of
+//! peaks.
+
+use crate::distribution::effective::Rule;
+use crate::distribution::peaks::Peaks;
+use crate::distribution::{BrdfMap, Clusters, Filter};
+use crate::gpu::image::ImageDesc;
+use crate::material::Material;
+use crate::moments::{self, Base, Parameter};
+use crate::pass::cluster_moments::Record;
+use bytemuck::Zeroable;
+use glam::{DVec2, DVec3};
+use std::sync::Arc;
+
+/// The clusters of all materials.
+pub(crate) struct Table {
+    pub records: Vec<Record>,
+    /// Of each material the first of its own, and how many there are.
+    pub of: Vec<[u32; 2]>,
+}
+
+impl Table {
+    /// Of `materials`, of which `bases` say what is filtered. Materials of the same maps and lobes have the same clusters.
+    pub fn of(materials: &[Material], bases: &[Option<Base>], filter: Filter) -> Self {
+        let mut table = Self { records: Vec::new(), of: Vec::new() };
+        for (i, (material, base)) in materials.iter().zip(bases).enumerate() {
+            let known = (0..i).find(|k| bases.get(*k) == Some(base) && same_maps(&materials[*k], material));
+            let own = match known.and_then(|k| table.of.get(k)) {
+                Some(own) => *own,
+                None => {
+                    base.as_ref().and_then(|base| moments::clusters(material, base, filter)).map_or([0; 2], |c| table.push(&c))
+                }
+            };
+            table.of.push(own);
+        }
+        if table.records.is_empty() {
+            // Something to bind.
+            table.records.push(Record::zeroed());
+        }
+        table
+    }
+
+    fn push(&mut self, clusters: &Clusters) -> [u32; 2] {
+        let first = self.records.len();
+        self.records.extend(clusters.all().iter().map(Record::from));
+        [first as u32, clusters.all().len() as u32]
+    }
+
+    /// The most that a material has, at least 1.
+    pub fn most(&self) -> u32 {
+        self.of.iter().map(|own| own[1]).fold(1, u32::max)
+    }
+}
+
+fn same_maps(a: &Material, b: &Material) -> bool {
+    let key = |m: &Material| {
+        (m.maps.normal.as_ref().map(Arc::as_ptr), m.maps.roughness.as_ref().map(|(map, kind)| (Arc::as_ptr(map), *kind)))
+    };
+    key(a) == key(b) && Parameter::of(&a.model) == Parameter::of(&b.model)
+}
+
+/// The texels of an image of peaks, level by level, in layers as many as are in `desc`: of the `sources`, materials with the first of
+/// their layers, `count` peaks each and, where lobes are not about them, as many normals, over maps of `size`.
+pub(crate) fn peaks(desc: &ImageDesc, size: [u32; 2], count: usize, sources: &[(&Material, usize)]) -> Vec<u8> {
+    let of = |(material, first): &(&Material, usize)| {
+        let map = BrdfMap::of(material, size, Rule::Exact).ok()?;
+        let normals = map.normal(0).is_some();
+        Some((Peaks::of(&map, count, Parameter::of(&material.model).area()), *first, normals))
+    };
+    let all: Vec<_> = sources.iter().filter_map(of).collect();
+    let mut texels: Vec<[f32; 4]> = Vec::new();
+    for level in 0..desc.levels {
+        let [width, height, _] = desc.level_extent(level);
+        let area = width as usize * height as usize;
+        let start = texels.len();
+        texels.resize(start + area * desc.layers.unwrap_or(1) as usize, [0.0; 4]);
+        let layers = &mut texels[start..];
+        for (peaks, first, normals) in &all {
+            for (i, peak) in peaks.level(level as usize + 1).iter().enumerate() {
+                let (at, below, lobe) = (octahedron(peak.lobe.mu), octahedron(peak.normal), &peak.lobe);
+                let texel = |layer: usize| (first + layer) * area + i / count;
+                if let Some(texel) = layers.get_mut(texel(i % count)) {
+                    *texel = [at.x, at.y, lobe.kappa, lobe.weight].map(|v| v as f32);
+                }
+                if let Some(texel) = layers.get_mut(texel(count + i % count)).filter(|_| *normals) {
+                    *texel = [below.x, below.y, 0.0, 0.0].map(|v| v as f32);
+                }
+            }
+        }
+    }
+    bytemuck::cast_slice(&texels).to_vec()
+}
+
+/// Twin of `oct_encode` in `glsl/include/oct.glsl`.
+fn octahedron(v: DVec3) -> DVec2 {
+    let at = v.truncate() / (v.x.abs() + v.y.abs() + v.z.abs());
+    let sign = |c: f64| if c >= 0.0 { 1.0 } else { -1.0 };
+    if v.z < 0.0 { DVec2::new((1.0 - at.y.abs()) * sign(at.x), (1.0 - at.x.abs()) * sign(at.y)) } else { at }
+}

@@ -1,0 +1,275 @@
+//! Filters that keep clusters, peaks or base texels: what is stored against the f64 twin, frames against quadrature, and what clusters
+//! are good for.
+#![cfg(feature = "offline")]
+
+mod support {
+    pub mod frames;
+}
+
+use glam::{DVec3, Mat4, Vec3};
+use passband::moments::Moments;
+use passband::offline::builtin;
+use passband::offline::headless::{Headless, Options};
+use passband::offline::reference::Options as Quadrature;
+use passband::offline::session::Session;
+use passband::offline::texture::{Encoding, Image, Part};
+use passband::offline::world::World;
+use passband::reflectance::{BlinnPhong, Lobe, Model, Vmf};
+use passband::{Config, Division, Estimator, Filter, Light, Maps, Requirements, Roughness, Texture};
+use std::f32::consts::TAU;
+use std::sync::Arc;
+use support::frames::{Stage, config, expected_with, furthest, ggx, ratio, tiles, world};
+
+fn texels<T>([w, h]: [u32; 2], f: impl Fn(f32, f32) -> T) -> Vec<T> {
+    (0..w * h).map(|i| f(((i % w) as f32 + 0.5) / w as f32, ((i / w) as f32 + 0.5) / h as f32)).collect()
+}
+
+/// Bumps that differ along u and v.
+fn normals(size: [u32; 2], height: f32) -> Option<Arc<Texture>> {
+    let texel = |u: f32, v: f32| {
+        Vec3::new(height * (TAU * 6.0 * u).sin() + 0.1, 0.7 * height * (TAU * (4.0 * v + u)).cos() - 0.15, 1.0).normalize()
+    };
+    Some(Arc::new(Texture::normals(size, &texels(size, |u, v| texel(u, v).to_array())).unwrap()))
+}
+
+fn roughness(size: [u32; 2], low: f32, high: f32) -> Option<(Arc<Texture>, Roughness)> {
+    let texel = |u: f32, v: f32| low * (high / low).powf(0.5 + 0.5 * (TAU * (3.0 * u + 2.0 * v)).sin());
+    Some((Arc::new(Texture::scalar(size, &texels(size, texel)).unwrap()), Roughness::Alpha))
+}
+
+fn blinn_phong() -> Model {
+    Model::BlinnPhong(BlinnPhong { exponent: 90.0, specular: DVec3::new(0.5, 0.6, 0.7), albedo: DVec3::splat(0.3) })
+}
+
+fn lobes(all: &[(f64, f64)]) -> Model {
+    let lobe = |&(x, kappa)| Lobe { mu: DVec3::new(x, 0.0, 1.0), kappa, weight: 0.4 };
+    Model::Vmf(Arc::new(Vmf::new(&all.iter().map(lobe).collect::<Vec<_>>()).unwrap()))
+}
+
+fn session(world: &World, config: &Config) -> Session {
+    let options = Options { device: Some("llvmpipe".into()), validate: true };
+    let headless = Headless::new(&options, &Requirements::of(config)).unwrap();
+    Session::new(headless, world, config).unwrap()
+}
+
+fn materials() -> World {
+    let mut scene = world("sphere", 16, blinn_phong(), builtin::environment("constant", 16).unwrap());
+    let first = scene.materials[0].clone();
+    let odd = [67, 45];
+    let with = |normal, roughness| Maps { normal, roughness, ..Maps::default() };
+    let all = [
+        ("ggx", ggx(0.3, DVec3::ONE, DVec3::ZERO), with(normals(odd, 0.5), None)),
+        ("rough ggx", ggx(0.3, DVec3::ONE, DVec3::ZERO), with(normals(odd, 0.3), roughness([32, 64], 0.02, 0.6))),
+        ("rough blinn-phong", blinn_phong(), with(normals(odd, 0.2), roughness(odd, 0.1, 0.4))),
+        ("two lobes", lobes(&[(0.7, 30.0), (-0.5, 60.0)]), with(normals(odd, 0.4), roughness(odd, 0.1, 0.8))),
+        ("no map", blinn_phong(), Maps::default()),
+    ];
+    scene.materials = all
+        .into_iter()
+        .map(|(name, model, maps)| {
+            let mut material = first.clone();
+            (material.name, material.model, material.maps) = (name.into(), model, maps);
+            material
+        })
+        .collect();
+    scene
+}
+
+#[test]
+fn passes_store_the_moments_of_the_twin() {
+    let scene = materials();
+    let config = Config { filter: Filter::Clusters, ..config([8, 8], Estimator::Mis, 2) };
+    let [mut one, mut other] = [session(&scene, &config), session(&scene, &config)];
+    assert!(one.setup().iter().any(|(name, _)| *name == "cluster_moments"));
+    for (number, material) in scene.materials.iter().enumerate() {
+        let name = &material.name;
+        let stored = one.moments(number).unwrap();
+        assert!(stored == other.moments(number).unwrap(), "{name}: the same in every run");
+        let Some(twin) = Moments::of(&material.surface(), Filter::Clusters, Division::default(), false) else {
+            assert!(stored.is_none() && material.maps.is_empty(), "{name}");
+            continue;
+        };
+        let [moments, layers] = stored.unwrap();
+        let twin = twin.lobes().unwrap();
+        let clusters = twin.clusters_of_map().unwrap();
+        let all = clusters.all().len();
+        let normals = name == "two lobes";
+        // Of 8 bytes each.
+        assert!(layers.len() * 8 == clusters.bytes() && clusters.bytes() <= 96, "{name}: {} layers", layers.len());
+        assert_eq!(
+            moments.len(),
+            match name.as_str() {
+                "two lobes" => 3,
+                _ => 1,
+            }
+        );
+        let (mut worst, mut apart, mut count) = (0.0f64, 0, 0);
+        for level in 1..twin.levels() {
+            for i in 0..layers[0][level - 1].1.len() {
+                let expected = twin.texel(level, i).unwrap();
+                let stored = |layer: usize| layers[layer][level - 1].1[i].map(f64::from);
+                let mut off = 0.0f64;
+                for k in 0..all {
+                    let [q, x, y, xx] = stored(k);
+                    let two = stored(all + if normals { k } else { k / 2 });
+                    let (xy, yy) = if normals { (two[0], two[1]) } else { (two[2 * (k % 2)], two[2 * (k % 2) + 1]) };
+                    let e: &[f64] = &expected[8 * k..8 * k + 8];
+                    // Lengths are stored 16 times as long; numbers of 16 bits have errors in proportion.
+                    let scale = 1e-3 * e[0] + 1e-6;
+                    if normals {
+                        off = off.max((two[2] - e[6]).abs().max((two[3] - e[7]).abs()) / scale);
+                    }
+                    let far = (e[3] + e[5]).max(1e-3 * e[0]) * 256.0;
+                    off = off.max((q - e[0]).abs() / scale);
+                    off =
+                        [x - 16.0 * e[1], y - 16.0 * e[2]].map(f64::abs).into_iter().fold(off, |m, d| m.max(d / (16.0 * scale)));
+                    let seconds = [xx - 256.0 * e[3], xy - 256.0 * e[4], yy - 256.0 * e[5]];
+                    off = seconds.map(f64::abs).into_iter().fold(off, |m, d| m.max(d / (2e-3 * far + 1e-4)));
+                }
+                count += 1;
+                // A lobe on the border of two clusters may fall into the other in 32 bits.
+                if off > 3.0 { apart += 1 } else { worst = worst.max(off) }
+            }
+        }
+        println!("{name}: {all} clusters, worst {worst:.2}, {apart} of {count} apart");
+        assert!(apart * 200 <= count, "{name}: {apart} of {count}");
+    }
+}
+
+#[test]
+fn peaks_are_stored_as_they_are() {
+    let scene = materials();
+    let config = Config { filter: Filter::Fournier4, ..config([8, 8], Estimator::Mis, 2) };
+    let mut session = session(&scene, &config);
+    for (number, material) in scene.materials.iter().enumerate() {
+        let Some(twin) = Moments::of(&material.surface(), Filter::Fournier4, Division::default(), false) else { continue };
+        let [_, layers] = session.moments(number).unwrap().unwrap();
+        let twin = twin.lobes().unwrap();
+        assert_eq!(layers.len(), if material.name == "two lobes" { 8 } else { 4 });
+        let mut compared = 0;
+        for level in 1..twin.levels() {
+            for i in 0..layers[0][level - 1].1.len() {
+                let expected = twin.texel(level, i).unwrap();
+                let stored: Vec<_> = layers[..4].iter().map(|layer| layer[level - 1].1[i]).filter(|t| t[3] > 0.0).collect();
+                assert_eq!(stored.len() * 8, expected.len(), "{} {level} {i}", material.name);
+                for (s, e) in stored.iter().zip(expected.as_chunks::<8>().0) {
+                    let [_, _, kappa, mass] = s.map(f64::from);
+                    assert!((mass - e[4]).abs() < 1e-6 && (kappa * mass / e[3] - 1.0).abs() < 1e-5, "{s:?} {e:?}");
+                    compared += 1;
+                }
+            }
+        }
+        assert!(compared > 1000, "{compared}");
+    }
+}
+
+/// One mesh, mirrored and stretched, under a small sun.
+fn scene(mesh: &str, model: Model, maps: Maps) -> World {
+    let mut world = world(mesh, 128, model, builtin::environment("sun-sky", 128).unwrap());
+    let object = &mut world.objects[0];
+    Arc::make_mut(&mut object.mesh).compute_tangents();
+    object.transform = Mat4::from_rotation_y(0.8) * Mat4::from_scale(Vec3::new(-1.0, 0.9, 1.0));
+    world.materials[0].maps = maps;
+    world
+}
+
+#[test]
+fn frames_are_those_of_the_quadrature() {
+    let tiled = |normal, roughness| Maps { normal, roughness, tiling: [3.0, 2.0], ..Maps::default() };
+    let all = |size| tiled(normals(size, 0.3), roughness(size, 0.1, 0.4));
+    let metal = || ggx(0.15, DVec3::splat(0.9), DVec3::splat(0.3));
+    let two = || lobes(&[(0.6, 60.0), (-0.4, 30.0)]);
+    let (odd, few) = ([67, 45], [13, 9]);
+    let mut wrong = Vec::new();
+    // Directions and frames: of those that draw lobes each frame has others, and the reference driver ends a shader's loops after 65 535
+    // rounds in all.
+    let cases = [
+        ("ggx", Filter::Clusters, metal(), all(odd), [2048, 1]),
+        ("blinn-phong", Filter::Clusters, blinn_phong(), all(odd), [2048, 1]),
+        ("one lobe", Filter::Clusters, lobes(&[(0.0, 60.0)]), all(odd), [2048, 1]),
+        ("two lobes", Filter::Clusters, two(), tiled(normals([64; 2], 0.3), None), [2048, 1]),
+        ("ggx", Filter::Fournier4, metal(), all(few), [256, 6]),
+        ("two lobes", Filter::Fournier7, two(), all(few), [256, 6]),
+        ("one lobe", Filter::BruteForce, lobes(&[(0.0, 60.0)]), all(few), [64, 40]),
+    ];
+    for (name, filter, model, maps, [directions, frames]) in cases {
+        let world = scene("sphere", model, maps);
+        let options = Quadrature { filter, ..Quadrature::default() };
+        let expected = expected_with(&world, [48, 48], options, |interior| {
+            interior.into_iter().filter(|i| (i % 48 + i / 48) % 3 == 0).collect()
+        });
+        let config = Config { filter, ..config(expected.extent, Estimator::Mis, directions) };
+        let (mean, _) = Stage::new(&world, &config).mean(0, frames);
+        let radiance = |i: usize| mean[i];
+        let all = ratio(&expected.pixels, radiance);
+        let tiles = tiles(&expected, 24, radiance);
+        let tile = furthest(tiles.iter().copied());
+        let name = format!("{name}, {}", filter.name());
+        println!("{name:24} mean {all:.5}, worst of {} tiles {tile:.5}, {} pixels", tiles.len(), expected.pixels.len());
+        assert!(expected.error <= 1e-3 && expected.pixels.len() > 200);
+        if (all - 1.0).abs() > 0.004 || (tile - 1.0).abs() > 0.02 {
+            wrong.push(name);
+        }
+    }
+    assert!(wrong.is_empty(), "{wrong:?}");
+}
+
+/// The built-in map `name` on a tilted plane under a light, minified.
+fn plane(name: &str, light: Light) -> World {
+    let normal = Image::builtin(name, Part::Normal).unwrap().normals(Encoding::Signed, true, 1.0).unwrap();
+    let kappa = Image::builtin(name, Part::Concentration).unwrap().roughness().unwrap();
+    let model = lobes(&[(0.0, 100.0)]);
+    let mut world = world("plane", 16, model, builtin::environment("constant", 16).unwrap());
+    Arc::make_mut(&mut world.objects[0].mesh).compute_tangents();
+    world.objects[0].transform = Mat4::from_rotation_x(0.9);
+    world.materials[0].maps =
+        Maps { normal: Some(Arc::new(normal)), roughness: Some((Arc::new(kappa), Roughness::Kappa)), ..Maps::default() };
+    world.environment = None;
+    world.lights = vec![light];
+    world
+}
+
+#[test]
+fn clusters_are_nearer_to_the_truth_than_cells() {
+    const SIDE: usize = 28;
+    const FINER: usize = 20;
+    let lamp = Light::Point { position: [0.5, 1.0, 1.2], intensity: [1.0; 3] };
+    for name in ["bumps", "disk"] {
+        let scene = plane(name, lamp);
+        let frame = |side: usize, filter| {
+            let config = Config { filter, ..config([side as u32; 2], Estimator::Mis, 2) };
+            Stage::new(&scene, &config).frame([0, 0])
+        };
+        let fine = frame(SIDE * FINER, Filter::Point);
+        let below = |i: usize| {
+            let (x, y) = (i % SIDE * FINER, i / SIDE * FINER);
+            (0..FINER * FINER).map(move |k| (y + k / FINER) * SIDE * FINER + x + k % FINER)
+        };
+        let inside: Vec<_> = (0..SIDE * SIDE).filter(|i| below(*i).all(|k| fine.coverage(k) == 1.0)).collect();
+        assert!(inside.len() > 100, "{}", inside.len());
+        let truth: Vec<_> =
+            inside.iter().map(|i| below(*i).map(|k| fine.radiance(k)).sum::<DVec3>() / (FINER * FINER) as f64).collect();
+        let squared: f64 = truth.iter().map(|t| t.length_squared()).sum();
+        let error = |filter| {
+            let image = frame(SIDE, filter);
+            let off: f64 = inside.iter().zip(&truth).map(|(i, t)| (image.radiance(*i) - t).length_squared()).sum();
+            (off / squared).sqrt()
+        };
+        let all = [Filter::Clusters, Filter::Vmf8, Filter::ToksvigLobe, Filter::Fournier7];
+        let [clusters, vmf8, toksvig, fournier] = all.map(error);
+        println!("{name}: clusters {clusters:.3}, vmf8 {vmf8:.3}, toksvig-lobe {toksvig:.3}, fournier7 {fournier:.3}");
+        assert!(clusters < 0.7 * vmf8 && clusters < 0.5 * toksvig && clusters < 1.4 * fournier, "{name}");
+    }
+}
+
+#[test]
+fn what_a_filter_cannot_do_is_refused() {
+    let scene = materials();
+    for filter in [Filter::Fournier4, Filter::Fournier7] {
+        let refused = Config { filter, anisotropy: 4, ..config([8, 8], Estimator::Mis, 2) };
+        let options = Options { device: Some("llvmpipe".into()), validate: false };
+        let headless = Headless::new(&options, &Requirements::of(&refused)).unwrap();
+        let error = Session::new(headless, &scene, &refused).err().unwrap().to_string();
+        assert!(error.contains("anisotropy") && error.contains("fournier"), "{error}");
+    }
+}
