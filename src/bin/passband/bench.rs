@@ -3,6 +3,7 @@
 use crate::sheet;
 use clap::ValueEnum;
 use indicatif::{ProgressBar, ProgressStyle};
+use passband::Filter;
 use passband::offline::bench::figures::Figure;
 use passband::offline::bench::report::Report;
 use passband::offline::bench::{reference, suites, xu};
@@ -39,6 +40,9 @@ pub struct Args {
     /// Timed frames of each variant [default: 5 of quick, 9 of full; of xu and tan 3 and 7]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=10_000))]
     rounds: Option<u32>,
+    /// Filters that xu and tan compare [default: all]
+    #[arg(long, value_name = "NAME", value_delimiter = ',', value_parser = filter)]
+    filters: Vec<Filter>,
     /// Image size [default: the scene's, else the preset's]
     #[arg(long, value_name = "WxH", value_parser = crate::render::size)]
     size: Option<[u32; 2]>,
@@ -116,7 +120,7 @@ impl Args {
     }
 
     /// Of the suites of filters.
-    fn filters(&self, suite: xu::Suite) -> Result<xu::Order> {
+    fn of_filters(&self, suite: xu::Suite) -> Result<xu::Order> {
         later(self.plots.is_some(), "--plots of --suite xu and tan")?;
         Ok(xu::Order {
             suite,
@@ -124,6 +128,7 @@ impl Args {
             rounds: self.rounds,
             extent: self.size,
             scenes: self.scenes.clone(),
+            filters: if self.filters.is_empty() { Filter::ALL.to_vec() } else { self.filters.clone() },
             device: self.options(),
             root: PathBuf::new(),
             cache: xu::cache_folder(),
@@ -155,6 +160,12 @@ impl Args {
     }
 }
 
+/// A filter by its name.
+fn filter(name: &str) -> std::result::Result<Filter, String> {
+    let names = || Filter::ALL.map(Filter::name).join(", ");
+    Filter::ALL.into_iter().find(|filter| filter.name() == name).ok_or_else(|| format!("expected one of {}", names()))
+}
+
 fn later(yes: bool, what: &str) -> Result<()> {
     if yes { Err(Error::NotSupportedYet { what: what.into() }) } else { Ok(()) }
 }
@@ -169,8 +180,8 @@ enum Order {
 pub fn run(args: &Args) -> Result<ExitCode> {
     args.check()?;
     let order = match args.suite {
-        Suite::Xu => Order::Filters(args.filters(xu::Suite::Xu)?),
-        Suite::Tan => Order::Filters(args.filters(xu::Suite::Tan)?),
+        Suite::Xu => Order::Filters(args.of_filters(xu::Suite::Xu)?),
+        Suite::Tan => Order::Filters(args.of_filters(xu::Suite::Tan)?),
         _ => Order::Rates(args.order()?),
     };
     // Before the work, not after it.

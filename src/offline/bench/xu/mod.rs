@@ -60,6 +60,8 @@ pub struct Order {
     pub extent: Option<[u32; 2]>,
     /// Scene files or built-in names in the place of the suite's own.
     pub scenes: Vec<String>,
+    /// Filters that are compared, in this order.
+    pub filters: Vec<Filter>,
     /// Device.
     pub device: Options,
     /// The repository, under which scene files and fetched files are.
@@ -165,7 +167,7 @@ impl Stage<'_> {
         let name = format!("{}, {}", self.world.name, self.light.name());
         let mut told = |what: &str, done, total| progress(&format!("{name}: {what}"), done, total);
         let extent = self.config.extent;
-        let mut rows: Vec<Row> = Filter::ALL.into_iter().map(Row::new).collect();
+        let mut rows: Vec<Row> = self.order.filters.iter().copied().map(Row::new).collect();
         let cache = self.order.cache.as_deref();
 
         let clock = Instant::now();

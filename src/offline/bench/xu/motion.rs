@@ -1,6 +1,5 @@
 //! Flicker: how much errors change from frame to frame while the eye moves.
 
-use crate::Filter;
 use crate::offline::bench::quality::Frame;
 use crate::offline::bench::reference::Goal;
 use crate::offline::bench::xu::report::{Flicker, Report, Row};
@@ -56,6 +55,7 @@ pub(super) fn flicker(
 ) -> Result<Flicker> {
     let mut found: Vec<[f64; 2]> = vec![[0.0; 2]; rows.len()];
     let mut noise = [0.0; 2];
+    let filters = &stage.order.filters;
     let total = u64::from(FRAMES);
     let extent = stage.config.extent.map(|e| e.min(MOST_SIDE));
     for (which, motion) in [Motion::Zoom, Motion::Orbit].into_iter().enumerate() {
@@ -78,7 +78,7 @@ pub(super) fn flicker(
         };
         // The difference of halves has twice the spread of their mean.
         noise[which] = of(&halves[0], &halves[1])? / 2.0;
-        for (done, ((filter, row), found)) in (1..).zip(Filter::ALL.into_iter().zip(rows.iter()).zip(&mut found)) {
+        for (done, ((filter, row), found)) in (1..).zip(filters.iter().copied().zip(rows.iter()).zip(&mut found)) {
             // What is drawn anew in each frame flickers by that.
             let session = match row.refused {
                 None if !filter.is_random() => {
@@ -97,10 +97,10 @@ pub(super) fn flicker(
                 }
                 found[which] = of(&frames, &pictures)?;
             }
-            told("moving frames", done, Filter::ALL.len() as u64);
+            told("moving frames", done, filters.len() as u64);
         }
     }
-    for ((row, filter), [zoom, orbit]) in rows.iter_mut().zip(Filter::ALL).zip(found) {
+    for ((row, filter), [zoom, orbit]) in rows.iter_mut().zip(filters).zip(found) {
         row.flicker = (row.refused.is_none() && !filter.is_random()).then_some(Flicker { zoom, orbit });
     }
     let [zoom, orbit] = noise;

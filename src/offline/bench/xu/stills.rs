@@ -47,7 +47,7 @@ pub(super) fn take(
     let (extent, total) = (stage.config.extent, rows.len() as u64);
     let reference = (truth.image().picture, mask(truth));
     let mut stills = Vec::new();
-    for (done, (filter, row)) in (1..).zip(Filter::ALL.into_iter().zip(rows.iter_mut())) {
+    for (done, (filter, row)) in (1..).zip(stage.order.filters.iter().copied().zip(rows.iter_mut())) {
         let config = stage.config(filter, extent, DIRECTIONS);
         match open(&stage.world, &config, stage.device())? {
             Ok(mut session) => {

@@ -76,7 +76,7 @@ pub(super) fn measure(stage: &Stage<'_>, rows: &mut [Row], progress: &mut dyn Fn
         first = subject(None, extent.map(|e| e * FINER), estimator.0)?;
     }
     let mut subjects = vec![first.map_err(|reason| Error::argument("scene", "materials that can be rendered", reason))?];
-    for (filter, row) in Filter::ALL.into_iter().zip(rows.iter_mut()).filter(|(_, row)| row.refused.is_none()) {
+    for (filter, row) in stage.order.filters.iter().copied().zip(rows.iter_mut()).filter(|(_, row)| row.refused.is_none()) {
         match subject(Some(filter), extent, estimator.0)? {
             Ok(subject) => subjects.push(subject),
             Err(reason) => row.refused = Some(reason),
