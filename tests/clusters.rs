@@ -196,7 +196,7 @@ fn frames_are_those_of_the_quadrature() {
         let world = scene("sphere", model, maps);
         let options = Quadrature { filter, ..Quadrature::default() };
         let expected = expected_with(&world, [48, 48], options, |interior| {
-            interior.into_iter().filter(|i| (i % 48 + i / 48) % 3 == 0).collect()
+            interior.into_iter().filter(|i| (i % 48 + i / 48) % 4 == 0).collect()
         });
         let config = Config { filter, ..config(expected.extent, Estimator::Mis, directions) };
         let (mean, _) = Stage::new(&world, &config).mean(0, frames);
@@ -206,7 +206,7 @@ fn frames_are_those_of_the_quadrature() {
         let tile = furthest(tiles.iter().copied());
         let name = format!("{name}, {}", filter.name());
         println!("{name:24} mean {all:.5}, worst of {} tiles {tile:.5}, {} pixels", tiles.len(), expected.pixels.len());
-        assert!(expected.error <= 1e-3 && expected.pixels.len() > 200);
+        assert!(expected.error <= 1e-3 && expected.pixels.len() > 150);
         if (all - 1.0).abs() > 0.004 || (tile - 1.0).abs() > 0.02 {
             wrong.push(name);
         }
@@ -231,35 +231,33 @@ fn plane(name: &str, light: Light) -> World {
 
 #[test]
 fn clusters_are_nearer_to_the_truth_than_cells() {
-    const SIDE: usize = 28;
-    const FINER: usize = 20;
+    const SIDE: usize = 24;
+    const FINER: usize = 16;
     let lamp = Light::Point { position: [0.5, 1.0, 1.2], intensity: [1.0; 3] };
-    for name in ["bumps", "disk"] {
-        let scene = plane(name, lamp);
-        let frame = |side: usize, filter| {
-            let config = Config { filter, ..config([side as u32; 2], Estimator::Mis, 2) };
-            Stage::new(&scene, &config).frame([0, 0])
-        };
-        let fine = frame(SIDE * FINER, Filter::Point);
-        let below = |i: usize| {
-            let (x, y) = (i % SIDE * FINER, i / SIDE * FINER);
-            (0..FINER * FINER).map(move |k| (y + k / FINER) * SIDE * FINER + x + k % FINER)
-        };
-        let inside: Vec<_> = (0..SIDE * SIDE).filter(|i| below(*i).all(|k| fine.coverage(k) == 1.0)).collect();
-        assert!(inside.len() > 100, "{}", inside.len());
-        let truth: Vec<_> =
-            inside.iter().map(|i| below(*i).map(|k| fine.radiance(k)).sum::<DVec3>() / (FINER * FINER) as f64).collect();
-        let squared: f64 = truth.iter().map(|t| t.length_squared()).sum();
-        let error = |filter| {
-            let image = frame(SIDE, filter);
-            let off: f64 = inside.iter().zip(&truth).map(|(i, t)| (image.radiance(*i) - t).length_squared()).sum();
-            (off / squared).sqrt()
-        };
-        let all = [Filter::Clusters, Filter::Vmf8, Filter::ToksvigLobe, Filter::Fournier7];
-        let [clusters, vmf8, toksvig, fournier] = all.map(error);
-        println!("{name}: clusters {clusters:.3}, vmf8 {vmf8:.3}, toksvig-lobe {toksvig:.3}, fournier7 {fournier:.3}");
-        assert!(clusters < 0.7 * vmf8 && clusters < 0.5 * toksvig && clusters < 1.4 * fournier, "{name}");
-    }
+    let scene = plane("bumps", lamp);
+    let frame = |side: usize, filter| {
+        let config = Config { filter, ..config([side as u32; 2], Estimator::Mis, 2) };
+        Stage::new(&scene, &config).frame([0, 0])
+    };
+    let fine = frame(SIDE * FINER, Filter::Point);
+    let below = |i: usize| {
+        let (x, y) = (i % SIDE * FINER, i / SIDE * FINER);
+        (0..FINER * FINER).map(move |k| (y + k / FINER) * SIDE * FINER + x + k % FINER)
+    };
+    let inside: Vec<_> = (0..SIDE * SIDE).filter(|i| below(*i).all(|k| fine.coverage(k) == 1.0)).collect();
+    assert!(inside.len() > 80, "{}", inside.len());
+    let truth: Vec<_> =
+        inside.iter().map(|i| below(*i).map(|k| fine.radiance(k)).sum::<DVec3>() / (FINER * FINER) as f64).collect();
+    let squared: f64 = truth.iter().map(|t| t.length_squared()).sum();
+    let error = |filter| {
+        let image = frame(SIDE, filter);
+        let off: f64 = inside.iter().zip(&truth).map(|(i, t)| (image.radiance(*i) - t).length_squared()).sum();
+        (off / squared).sqrt()
+    };
+    let all = [Filter::Clusters, Filter::Vmf8, Filter::ToksvigLobe, Filter::Fournier7];
+    let [clusters, vmf8, toksvig, fournier] = all.map(error);
+    println!("bumps: clusters {clusters:.3}, vmf8 {vmf8:.3}, toksvig-lobe {toksvig:.3}, fournier7 {fournier:.3}");
+    assert!(clusters < 0.7 * vmf8 && clusters < 0.5 * toksvig && clusters < 1.4 * fournier);
 }
 
 #[test]

@@ -90,7 +90,7 @@ mod tests {
             let round = vmf::Lobe { mu: DVec3::new(0.3, -0.2, 0.9).normalize(), kappa, weight: 0.7 };
             let lobe = Lobe { ratio, ..Lobe::from(round) };
             // The mean over samples of weight / density, in a cap, is its area.
-            let drop = (3.0 / kappa).min(1.0);
+            let drop = (3.0 / (kappa * ratio)).min(1.0);
             let side = 400;
             let unit = |i: i32| (f64::from(i) + 0.5) / f64::from(side);
             let (mut area, mut off) = (0.0, [0.0; 2]);

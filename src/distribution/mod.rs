@@ -24,6 +24,7 @@ pub mod prefilter;
 pub mod reflected;
 pub mod slope;
 pub mod stereographic;
+mod stored;
 pub mod suns;
 pub mod surface;
 pub mod vmf;

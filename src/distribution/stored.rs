@@ -1,0 +1,111 @@
+//! What texels hold, and how it is added.
+
+use crate::distribution::literal;
+use crate::distribution::vmf::{self, LEAST_SPREAD, Lobe};
+use glam::DVec3;
+use std::ops::{Add, Mul};
+
+/// Numbers of a lobe that is kept as it is: mass times direction, times concentration, mass; mass times the normal below.
+pub(super) const KEPT: usize = 8;
+
+/// For each cell: weight times characteristic vector, weight, weight times the mean length of the characteristic vectors, and weight
+/// times the normals below: those of lobes about them are their characteristic vectors.
+pub(super) const CELL: usize = 8;
+
+/// Lobes of less weight are none.
+pub(super) const LEAST_WEIGHT: f64 = 1e-12;
+
+/// Stored numbers, scaled one by one; added one by one, or one behind the other.
+pub(super) enum Sum {
+    Added(Vec<f64>),
+    Joined(Vec<f64>),
+}
+
+impl Sum {
+    pub fn all(self) -> Vec<f64> {
+        match self {
+            Self::Added(all) | Self::Joined(all) => all,
+        }
+    }
+}
+
+impl Add for Sum {
+    type Output = Self;
+    fn add(self, other: Self) -> Self {
+        match self {
+            Self::Added(all) => Self::Added(all.iter().zip(other.all()).map(|(a, b)| a + b).collect()),
+            Self::Joined(mut all) => {
+                all.extend(other.all());
+                Self::Joined(all)
+            }
+        }
+    }
+}
+
+impl Mul<f64> for Sum {
+    type Output = Self;
+    fn mul(mut self, factor: f64) -> Self {
+        let (Self::Added(all) | Self::Joined(all)) = &mut self;
+        all.iter_mut().for_each(|c| *c *= factor);
+        self
+    }
+}
+
+/// The texels of `from` that texel `i` of `size` covers, on one axis, and their shares.
+pub(super) fn covered(i: usize, size: u32, from: u32) -> impl Iterator<Item = (usize, f64)> {
+    let (size, from) = (size as usize, from as usize);
+    let (start, end) = (i * from, (i + 1) * from);
+    let share = move |k: usize| (end.min((k + 1) * size) - start.max(k * size)) as f64 / from as f64;
+    (start / size..end.div_ceil(size)).map(move |k| (k, share(k)))
+}
+
+/// A lobe with the mass `q`.
+pub(super) fn kept(l: &Lobe, normal: DVec3, q: f64) -> [f64; KEPT] {
+    let n = q * normal.normalize_or(DVec3::Z);
+    [q * l.mu.x, q * l.mu.y, q * l.mu.z, q * l.kappa, q, n.x, n.y, n.z]
+}
+
+pub(super) fn lobe_kept([x, y, z, kappa, q, nx, ny, nz]: [f64; KEPT], mass: f64) -> Option<(Lobe, DVec3)> {
+    let mu = DVec3::new(x, y, z).try_normalize().unwrap_or(DVec3::Z);
+    (q > 0.0).then(|| (Lobe { mu, kappa: kappa / q, weight: q / mass }, DVec3::new(nx, ny, nz)))
+}
+
+/// A stored cell.
+#[derive(Clone, Copy)]
+pub(super) struct Cell(pub [f64; CELL]);
+
+impl Cell {
+    pub fn plus(self, other: &Self) -> Self {
+        Self(std::array::from_fn(|i| self.0[i] + other.0[i]))
+    }
+
+    pub fn sum(&self) -> DVec3 {
+        DVec3::new(self.0[0], self.0[1], self.0[2])
+    }
+
+    pub fn weight(&self) -> f64 {
+        self.0[3]
+    }
+
+    /// Of its mean vector.
+    pub fn spread(&self) -> f64 {
+        (1.0 - self.sum().length() / self.weight().max(LEAST_WEIGHT)).max(LEAST_SPREAD)
+    }
+
+    /// The mean of its lobes' own.
+    pub fn base_spread(&self) -> f64 {
+        (1.0 - self.0[4] / self.weight().max(LEAST_WEIGHT)).max(LEAST_SPREAD)
+    }
+
+    pub fn normal(&self) -> DVec3 {
+        DVec3::new(self.0[5], self.0[6], self.0[7])
+    }
+
+    /// Its lobe and the normal below.
+    pub fn lobe(&self, literal: bool, share: f64) -> Option<(Lobe, DVec3)> {
+        let kappa = if literal { literal::concentration(self.spread()) } else { vmf::concentration(self.spread()) };
+        let mu = self.sum().try_normalize().unwrap_or(DVec3::Z);
+        let lobe = Lobe { mu, kappa, weight: share * self.weight() };
+        (self.weight() > LEAST_WEIGHT).then_some((lobe, self.normal()))
+    }
+}
