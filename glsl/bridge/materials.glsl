@@ -182,7 +182,7 @@ vec3 material_tables(Material m, vec3 wi, vec3 wo, vec3 h, vec3 t) {
     float weight = at - node;
     vec2 table = m.table;
     vec3 sum = vec3(0.0);
-    for (uint i = 0u; i < ((MATERIAL_KINDS & 1u << REFLECTANCE_TURNED) != 0u ? 2u : 1u); ++i) {
+    for (uint i = 0u; i < 2u; ++i) {
         if (turned) {
             float slot = float(m.record.kind.y) + node - count * floor((node + 0.5) / count);
             float row = floor((slot + 0.5) / columns);
