@@ -4,6 +4,9 @@
 // Whether the filter widens lobes.
 layout(constant_id = 0) const bool KERNEL = false;
 #define MATERIAL_KERNEL KERNEL
+// A bit for each kind of reflectance that there is.
+layout(constant_id = 15) const uint KINDS = 31u;
+#define MATERIAL_KINDS KINDS
 #define PREFILTER_BINDING 5
 #define LOBES_BINDING 9
 #define FIT_BINDING 10

@@ -29,7 +29,7 @@ void main() {
     Material m;
     m.record = materials[gbuffer_material(p)];
     Fit fit = fit_load(m, f.view.z);
-    float error = fit.count > 0u ? fit_error(fit) : 1.0;
+    float error = fit.count > 0u ? fit.error : 1.0;
     uint found = error <= push.errors.x ? push.coarsest : (error <= push.errors.y ? push.half_rate : push.finest);
     imageStore(level, p, uvec4(found));
 }

@@ -15,11 +15,18 @@
 #define MATERIAL_KERNEL false
 #endif
 
+// A bit for each kind of reflectance that there may be: a pass that is compiled for those that there are defines it as its
+// specialization constant.
+#ifndef MATERIAL_KINDS
+#define MATERIAL_KINDS 31u
+#endif
+
 const uint REFLECTANCE_TABLE = 0u;
 const uint REFLECTANCE_GGX = 1u;
 const uint REFLECTANCE_BLINN_PHONG = 2u;
 const uint REFLECTANCE_VMF = 3u;
 const uint REFLECTANCE_TURNED = 4u;
+const uint REFLECTANCE_TABLES = 1u << REFLECTANCE_TABLE | 1u << REFLECTANCE_TURNED; // as bits
 
 // Table resolution (MERL) and importance table layout (src/reflectance/importance.rs).
 const vec3 TABLE_SIZE = vec3(180.0, 90.0, 90.0); // phi_d, theta_d, theta_h
@@ -68,6 +75,14 @@ struct Material {
     float area;      // projected area of the lobes so widened
 };
 
+bool material_is(uint kind, uint which) {
+    return (MATERIAL_KINDS & 1u << which) != 0u && kind == which;
+}
+
+bool material_is_table(uint kind) {
+    return (MATERIAL_KINDS & ~REFLECTANCE_TABLES) == 0u || material_is(kind, REFLECTANCE_TABLE) || material_is(kind, REFLECTANCE_TURNED);
+}
+
 // Concentration and density at the centre of the lobe that a record holds, as maps and filters leave it.
 vec2 material_lobe(Material m, uint record) {
     float kappa = materials[record].f0.w;
@@ -87,15 +102,15 @@ Material material_load(uint id, float cos_o, vec3 turn, Factors factors) {
     Material m;
     m.record = materials[id];
     uint kind = m.record.kind.x;
-    bool table = kind == REFLECTANCE_TABLE || kind == REFLECTANCE_TURNED;
-    bool vmf = kind == REFLECTANCE_VMF;
+    bool table = material_is_table(kind);
+    bool vmf = material_is(kind, REFLECTANCE_VMF);
     vec3 f0 = m.record.f0.rgb * (table ? factors.albedo : factors.specular);
     m.record.f0.rgb = table || vmf ? f0 : min(f0, 1.0);
     m.record.albedo.rgb = min(m.record.albedo.rgb * factors.albedo, 1.0);
 
     // Alpha squared: a lobe's is 2 / concentration, a cosine's 2 / (exponent + 2).
     bool rough = factors.alpha != NO_ALPHA;
-    bool cosine = kind == REFLECTANCE_BLINN_PHONG;
+    bool cosine = material_is(kind, REFLECTANCE_BLINN_PHONG);
     float own = m.record.f0.w;
     float square = vmf ? m.record.albedo.w : (cosine ? 2.0 / (own + 2.0) : own * own);
     float before = square;
@@ -152,7 +167,7 @@ Material material_load(uint id, float cos_o) {
 // A table, or tables over the half vector's azimuth (src/reflectance/turned.rs) of which two neighbours are mixed; h is the half
 // vector of directions above the horizon, t the same in the tangent frame.
 vec3 material_tables(Material m, vec3 wi, vec3 wo, vec3 h, vec3 t) {
-    bool turned = m.record.kind.x == REFLECTANCE_TURNED;
+    bool turned = material_is(m.record.kind.x, REFLECTANCE_TURNED);
     vec2 size = vec2(textureSize(reflectance_tables, 0).yz);
     vec2 border = max(vec2(TABLE_BORDER), 0.5 + size * (1.0 / 4194304.0));
     vec2 c = vec2(acos_positive(clamp(dot(wo, h), 0.0, 1.0)) * (2.0 * INV_PI), half_warp(h)) * TABLE_SIZE.yz;
@@ -205,9 +220,9 @@ vec3 material_evaluate(Material m, vec3 wi, vec3 wo, vec3 h) {
     uint kind = m.record.kind.x;
     vec3 t = vec3(m.turn.x * h.x - m.turn.y * h.y, (m.turn.y * h.x + m.turn.x * h.y) * m.turn.z, h.z);
     vec3 value;
-    if (kind == REFLECTANCE_TABLE || kind == REFLECTANCE_TURNED) {
+    if (material_is_table(kind)) {
         value = material_tables(m, wi, wo, h, t);
-    } else if (kind == REFLECTANCE_GGX) {
+    } else if (material_is(kind, REFLECTANCE_GGX)) {
         value = ggx_evaluate(m.record.f0.rgb, m.record.albedo.rgb, m.record.f0.a, wi, wo, h);
     } else {
         value = m.record.f0.rgb * (material_distribution(m, h, t) * cavity_masking(wi, wo, h)) + m.record.albedo.rgb * INV_PI;

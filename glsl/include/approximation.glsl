@@ -28,7 +28,7 @@ Approximation approximation_load(Material m, Lobes l, vec3 wo) {
         a.fit = fit_load(m, wo.z);
         bool fitted = a.fit.count > 0u;
         a.count = fitted ? a.fit.count : a.count;
-        a.diffuse = fitted ? fit_diffuse(a.fit) : a.diffuse;
+        a.diffuse = fitted ? a.fit.diffuse : a.diffuse;
     }
     return a;
 }
@@ -61,7 +61,7 @@ ReflectedLobe approximation_lobe(Material m, Lobes l, Approximation a, uint i, v
 float approximation_error(Approximation a) {
     float error = 1.0;
     if (FITTED != 0u) {
-        error = a.fit.count > 0u ? fit_error(a.fit) : error;
+        error = a.fit.count > 0u ? a.fit.error : error;
     }
     return error;
 }

@@ -75,8 +75,11 @@ impl Base {
         let mut make = |lights| {
             // Constants 2 to 5 are of no use here.
             let own = [u32::from(config.widened()), lights, 0, 0, 0, 0];
-            let constants: Vec<_> =
-                own.into_iter().chain(shade::lobe_constants(config, kinds)).chain([u32::from(config.exact_lobes)]).collect();
+            let constants: Vec<_> = own
+                .into_iter()
+                .chain(shade::lobe_constants(config, kinds))
+                .chain([u32::from(config.exact_lobes), kinds.models])
+                .collect();
             ComputePipeline::new(p.build, p.modules, &INTERFACE, p.bridge, p.slots, &constants)
         };
         Ok(Self([make(0)?, make(1)?]))

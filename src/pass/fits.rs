@@ -1,22 +1,46 @@
 //! The lobe fits of materials as `glsl/include/fit.glsl` reads them.
 
-use crate::distribution::fit::LobeFit;
+use crate::distribution::fit::{FitLobe, LobeFit};
+use glam::DVec3;
 use std::sync::Arc;
 
 /// Fits of all materials, packed.
 pub(crate) struct Packed {
-    /// A 0 for materials without; of each fit its number of lobes, then its nodes: diffuse reflectance, error, lobes.
-    pub floats: Vec<f32>,
+    /// In words of four. First 0s, for materials without. Then of each fit the spaces between two nodes of the view angle: index of
+    /// the first of its lobes and their number, error at both; diffuse reflectance at the first, at the second. And then the lobes
+    /// of each space that have an amplitude at either of its nodes: tilt and log2 of the concentration at the first, at the second;
+    /// amplitudes at both, in 16 bits each of the greatest, and that.
+    pub words: Vec<[u32; 4]>,
     /// Where each material's fit begins.
     pub firsts: Vec<u32>,
-    /// The most lobes of a fit.
+    /// The most lobes between two nodes.
     pub most: usize,
+}
+
+/// Words of what is known of a space between nodes beside its lobes.
+const HEAD: usize = 3;
+
+fn bits(v: DVec3) -> [u32; 4] {
+    let [x, y, z] = v.as_vec3().to_array().map(f32::to_bits);
+    [x, y, z, 0]
+}
+
+/// A lobe at both ends of a space.
+fn lobe([a, b]: [&FitLobe; 2]) -> [[u32; 4]; 2] {
+    let shape = [a.tilt, a.log2_kappa, b.tilt, b.log2_kappa].map(|v| (v as f32).to_bits());
+    let greatest = a.amplitude.abs().max(b.amplitude.abs()).max_element() as f32;
+    let step = |v: f64| match greatest > 0.0 {
+        true => u32::from(((v / f64::from(greatest)).clamp(-1.0, 1.0) * 32767.0).round() as i16 as u16),
+        false => 0,
+    };
+    let [a, b] = [a.amplitude, b.amplitude].map(|v| v.to_array().map(step));
+    [shape, [a[0] | a[1] << 16, a[2] | b[0] << 16, b[1] | b[2] << 16, greatest.to_bits()]]
 }
 
 impl Packed {
     /// Of `fits`, of which shared ones are packed once.
     pub fn of(fits: &[Option<Arc<LobeFit>>]) -> Self {
-        let mut packed = Self { floats: vec![0.0], firsts: Vec::new(), most: 0 };
+        let mut packed = Self { words: vec![[0; 4]; HEAD], firsts: Vec::new(), most: 0 };
         let mut known: Vec<(*const LobeFit, u32)> = Vec::new();
         for fit in fits {
             let Some(fit) = fit else {
@@ -24,9 +48,9 @@ impl Packed {
                 continue;
             };
             let place = Arc::as_ptr(fit);
-            let first = known.iter().find(|k| k.0 == place).map_or(packed.floats.len() as u32, |k| k.1);
+            let first = known.iter().find(|k| k.0 == place).map_or(packed.words.len() as u32, |k| k.1);
             packed.firsts.push(first);
-            if first as usize == packed.floats.len() {
+            if first as usize == packed.words.len() {
                 known.push((place, first));
                 packed.add(fit);
             }
@@ -35,38 +59,70 @@ impl Packed {
     }
 
     fn add(&mut self, fit: &LobeFit) {
-        self.most = self.most.max(fit.count());
-        self.floats.push(fit.count() as f32);
-        for node in fit.nodes() {
-            self.floats.extend(node.diffuse.as_vec3().to_array());
-            self.floats.push(node.error as f32);
-            for lobe in &node.lobes {
-                self.floats.extend([lobe.tilt as f32, lobe.log2_kappa as f32]);
-                self.floats.extend(lobe.amplitude.as_vec3().to_array());
+        let spaces: Vec<_> = fit.nodes().windows(2).collect();
+        let mut first = self.words.len() + HEAD * spaces.len();
+        let mut lobes = Vec::new();
+        for nodes in spaces {
+            let [a, b] = [&nodes[0], &nodes[1]];
+            let both = || a.lobes.iter().zip(&b.lobes).map(|(a, b)| [a, b]);
+            let before = lobes.len();
+            lobes.extend(both().filter(|l| l.iter().any(|l| l.amplitude != DVec3::ZERO)).flat_map(lobe));
+            if lobes.len() == before {
+                // None at all would be no fit.
+                lobes.extend(lobe([&FitLobe::default(); 2]));
             }
+            let count = (lobes.len() - before) / 2;
+            let [error, next] = [a.error, b.error].map(|e| (e as f32).to_bits());
+            self.words.extend([[first as u32, count as u32, error, next], bits(a.diffuse), bits(b.diffuse)]);
+            self.most = self.most.max(count);
+            first += 2 * count;
         }
+        self.words.append(&mut lobes);
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::distribution::fit::{FitLobe, FitNode, NODES};
-    use glam::DVec3;
+    use crate::distribution::fit::{FitNode, NODES};
+
+    fn fit(amplitudes: &[DVec3]) -> Option<Arc<LobeFit>> {
+        let lobe = |&amplitude| FitLobe { tilt: 0.5, log2_kappa: 3.0, amplitude };
+        let node = FitNode { lobes: amplitudes.iter().map(lobe).collect(), diffuse: DVec3::splat(0.4), error: 0.1 };
+        Some(Arc::new(LobeFit::new(vec![node; NODES]).unwrap()))
+    }
 
     #[test]
     fn fits_lie_one_behind_the_other() {
-        let fit = |count: usize, error: f64| {
-            let lobe = FitLobe { tilt: 0.5, log2_kappa: 3.0, amplitude: DVec3::new(0.1, 0.2, 0.3) };
-            let node = FitNode { lobes: vec![lobe; count], diffuse: DVec3::splat(0.4), error };
-            Some(Arc::new(LobeFit::new(vec![node; NODES]).unwrap()))
-        };
-        let (two, three) = (fit(2, 0.1), fit(3, 0.2));
+        let grey = DVec3::new(0.1, 0.2, 0.3);
+        let (two, three) = (fit(&[grey; 2]), fit(&[grey; 3]));
         let packed = Packed::of(&[None, two.clone(), three, two]);
-        let size = |count: usize| 1 + NODES * (4 + 5 * count);
-        assert_eq!(packed.firsts, [0, 1, 1 + size(2) as u32, 1]);
-        assert_eq!((packed.floats.len(), packed.most), (1 + size(2) + size(3), 3));
-        assert_eq!(packed.floats[1..11], [2.0, 0.4, 0.4, 0.4, 0.1, 0.5, 3.0, 0.1, 0.2, 0.3]);
-        assert_eq!(packed.floats[1 + size(2)..][..5], [3.0, 0.4, 0.4, 0.4, 0.2]);
+        let size = |count: usize| (NODES - 1) * (HEAD + 2 * count);
+        let starts = [HEAD, HEAD + size(2)];
+        assert_eq!(packed.firsts, [0, starts[0] as u32, starts[1] as u32, starts[0] as u32]);
+        assert_eq!((packed.words.len(), packed.most), (starts[1] + size(3), 3));
+        assert!(packed.words[..HEAD].iter().all(|w| *w == [0; 4]));
+        for (start, count) in starts.into_iter().zip([2u32, 3]) {
+            let head = packed.words[start + HEAD * 7];
+            let lobes = (start + HEAD * (NODES - 1)) as u32;
+            assert_eq!(head, [lobes + 2 * count * 7, count, 0.1f32.to_bits(), 0.1f32.to_bits()]);
+            assert_eq!(packed.words[start + HEAD * 7 + 1][..3], [0.4f32.to_bits(); 3]);
+            assert_eq!(packed.words[head[0] as usize], [0.5f32, 3.0, 0.5, 3.0].map(f32::to_bits));
+            let [x, y, z, greatest] = packed.words[head[0] as usize + 1];
+            let steps = [x, x >> 16, y, y >> 16, z, z >> 16].map(|v| f64::from(v as u16 as i16) / 32767.0);
+            for (step, expected) in steps.into_iter().zip([0.1, 0.2, 0.3, 0.1, 0.2, 0.3]) {
+                let found = step * f64::from(f32::from_bits(greatest));
+                assert!((found - expected).abs() < 0.3 / 65534.0 + 1e-7, "{found} for {expected}");
+            }
+        }
+    }
+
+    #[test]
+    fn lobes_without_amplitude_are_left_out() {
+        let packed = Packed::of(&[fit(&[DVec3::ZERO, DVec3::ONE, DVec3::ZERO]), fit(&[DVec3::ZERO]), fit(&[])]);
+        assert_eq!(packed.most, 1);
+        for first in packed.firsts {
+            assert_eq!(packed.words[first as usize][1], 1);
+        }
     }
 }

@@ -59,6 +59,8 @@ pub(crate) struct Kinds {
     pub reflected: bool,
     /// The most lobes that stand for one where light is looked up.
     pub most_lobes: u32,
+    /// A bit for each `REFLECTANCE_*` of `glsl/bridge/materials.glsl` that there is.
+    pub models: u32,
 }
 
 /// What the shaders read.
@@ -149,6 +151,17 @@ impl<'a> Tables<'a> {
     }
 }
 
+/// As `glsl/bridge/materials.glsl` numbers kinds of reflectance.
+fn number(model: &Model) -> u32 {
+    match model {
+        Model::Table(_) => 0,
+        Model::Ggx(_) => 1,
+        Model::BlinnPhong(_) => 2,
+        Model::Vmf(_) => 3,
+        Model::Turned(_) => 4,
+    }
+}
+
 /// The records of `materials`, and behind them those of vMF lobes; `columns` is the width of the atlas in tables.
 fn records(materials: &[Material], tables: &Tables<'_>, importance: &[[f32; 4]], columns: u32) -> Vec<Record> {
     let with = |v: DVec3, w: f64| v.extend(w).as_vec4().to_array();
@@ -159,12 +172,12 @@ fn records(materials: &[Material], tables: &Tables<'_>, importance: &[[f32; 4]],
         .zip(importance)
         .map(|((Material { model, .. }, &slot), &importance)| {
             let scale = tables.all.get(slot).map_or(1.0, |t| t.1);
-            let slot = slot as u32;
+            let (kind, slot) = (number(model), slot as u32);
             let record = |kind, f0, albedo| Record { kind, f0, albedo, importance, texture_bandwidth: [0.0; 4] };
             match model {
-                Model::Table(_) => record([0, slot % columns, slot / columns, 0], [1.0; 4], [1.0, 1.0, 1.0, scale]),
-                Model::Ggx(g) => record([1, 0, 0, 0], with(g.f0, g.alpha), with(g.albedo, 1.0)),
-                Model::BlinnPhong(b) => record([2, 0, 0, 0], with(b.specular, b.exponent), with(b.albedo, 1.0)),
+                Model::Table(_) => record([kind, slot % columns, slot / columns, 0], [1.0; 4], [1.0, 1.0, 1.0, scale]),
+                Model::Ggx(g) => record([kind, 0, 0, 0], with(g.f0, g.alpha), with(g.albedo, 1.0)),
+                Model::BlinnPhong(b) => record([kind, 0, 0, 0], with(b.specular, b.exponent), with(b.albedo, 1.0)),
                 Model::Vmf(vmf) => {
                     let first = materials.len() + lobes.len();
                     let weight: f64 = vmf.lobes().iter().map(|l| l.weight).sum();
@@ -177,12 +190,12 @@ fn records(materials: &[Material], tables: &Tables<'_>, importance: &[[f32; 4]],
                         texture_bandwidth: [0.0; 4],
                     };
                     lobes.extend(vmf.lobes().iter().zip(vmf.peaks()).map(lobe));
-                    let kind = [3, first as u32, vmf.lobes().len() as u32, 0];
+                    let kind = [kind, first as u32, vmf.lobes().len() as u32, 0];
                     let sharpest = own_square(model).unwrap_or(1.0);
                     record(kind, with(DVec3::ONE, facing / weight), with(DVec3::ONE, sharpest))
                 }
                 Model::Turned(turned) => {
-                    let kind = [4, slot, turned.nodes().len() as u32, 0];
+                    let kind = [kind, slot, turned.nodes().len() as u32, 0];
                     record(kind, with(DVec3::ONE, turned.nodes_per_radian()), [1.0, 1.0, 1.0, scale])
                 }
             }
@@ -238,6 +251,7 @@ fn kinds(materials: &[Material], found: &[bool], packed: &Packed, filter: Filter
         fitted: packed.most > 0,
         reflected: reflected.is_some(),
         most_lobes: reflected.unwrap_or_default().max(packed.most as u32),
+        models: materials.iter().fold(0, |bits, m| bits | 1 << number(&m.model)),
     }
 }
 
@@ -272,7 +286,7 @@ impl MaterialsUpload {
         let storage = vk::BufferUsageFlags::STORAGE_BUFFER;
         let fit_upload = estimator
             .looks_up()
-            .then(|| BufferUpload::new(build, "lobe fits", storage, bytemuck::cast_slice(&fitted.floats)))
+            .then(|| BufferUpload::new(build, "lobe fits", storage, bytemuck::cast_slice(&fitted.words)))
             .transpose()?;
         let bandwidths = eps.map(|eps| bandwidths(build, materials, &mut records, eps)).transpose()?;
         let left: Vec<_> = fits.iter().map(|fit| fit.as_deref().filter(|_| estimator.has_residual())).collect();
