@@ -63,6 +63,11 @@ impl Renderer {
         self.cells.as_ref()?.arrays(object, &self.materials.as_ref()?.images.maps)
     }
 
+    /// Bytes of the materials' lobe fits.
+    pub(crate) fn fit_bytes(&self) -> u64 {
+        self.materials.as_ref().and_then(|m| m.images.fits.as_ref()).map_or(0, |fits| fits.size)
+    }
+
     /// Layout of set 1.
     pub(crate) fn material_layout(&self) -> vk::DescriptorSetLayout {
         self.bridge.layout

@@ -63,7 +63,7 @@ fn whichever_request_fails_nothing_is_kept() {
         // SAFETY: the command buffer is recording.
         rig.try_submit(|cmd, _, memory| unsafe { renderer.record_materials(cmd, &models, memory) })
     });
-    assert_eq!(requests, 13, "four images and two buffers, each with staging, and the moments");
+    assert_eq!(requests, 15, "four images and three buffers, each with staging, and the moments");
 
     let draws = [rig.draw(&builtin::mesh("sphere", 16).unwrap(), 0)];
     let image = rig.frame(&mut renderer, &draws);

@@ -98,10 +98,10 @@ fn impossible_renderers_are_refused_and_leave_nothing() {
     assert!(text.contains("maxStorageBufferRange"), "{text}");
 
     let mut broken = config();
-    broken.modules.replace("shade.comp", vec![1, 2, 3]);
+    broken.modules.replace("resolve.comp", vec![1, 2, 3]);
     // SAFETY: as above.
     match unsafe { Renderer::new(&rig.gpu.host(), &broken, &mut rig.memory) } {
-        Err(Error::Shader { name, .. }) => assert_eq!(name, "shade.comp"),
+        Err(Error::Shader { name, .. }) => assert_eq!(name, "resolve.comp"),
         other => panic!("{:?}", other.err()),
     }
     assert_clean(&rig.close());

@@ -84,7 +84,7 @@ impl Session {
         headless.submit(|cmd, memory| Ok(unsafe { renderer.record_materials(cmd, &materials, memory) }?))?;
         // Beside the work on the processor, with which the rest of it is told.
         let on_device = of_maps(&renderer)?;
-        let material_bytes = headless.live_bytes().saturating_sub(others);
+        let material_bytes = headless.live_bytes().saturating_sub(others + renderer.fit_bytes());
         let others: f64 = on_device.iter().map(|(_, time)| time).sum();
         setup.push((crate::pass::materials::NAME, milliseconds(clock) - others));
         setup.extend(on_device);
@@ -296,7 +296,8 @@ impl Session {
         self.renderer.as_ref().map_or(&[], Renderer::pass_bytes)
     }
 
-    /// Bytes of device memory that the materials take: tables, textures, and the maps of the filter.
+    /// Bytes of device memory that the materials take: tables, textures, and the maps of the filter, but not
+    /// lobe fits, which materials without filtered lobes have.
     pub fn material_bytes(&self) -> u64 {
         self.material_bytes
     }
