@@ -103,7 +103,7 @@ fn filters_are_compared_with_the_truth() {
     let aims = report["targets"].as_array().unwrap();
     let of = |part: &str| aims.iter().find(|t| t["what"].as_str().unwrap().contains(part));
     assert!(of("vmf8 over").is_none(), "these aims are of the suite's own scenes: {aims:?}");
-    assert!(of("clusters over bruteforce's").is_some() && of("clusters over vmf8's").is_some(), "{aims:?}");
+    assert!(of("clusters over fournier4's").is_some() && of("clusters over vmf8's").is_some(), "{aims:?}");
     let clusters = |light: &str| number(&row(under(&report, light), "clusters")["errors"]["rel_l2"]);
     let cells = |light: &str| number(&row(under(&report, light), "vmf8")["errors"]["rel_l2"]);
     assert!(clusters("point") < cells("point") && clusters("environment") < 1.1 * cells("environment"));
