@@ -56,7 +56,7 @@ impl Default for Budget {
 
 impl LobeFit {
     /// Fits `reflectance` (its mean over turns about the normal) by the fewest lobes whose mean error, as far as one node in
-    /// [`STRIDE`] tells, is at most that of the budget, or about the least within it. The same on any number of threads; two are
+    /// four tells, is at most that of the budget, or about the least within it. The same on any number of threads; two are
     /// used, for one to four seconds (a table that is not isotropic: two more).
     pub fn build(reflectance: &dyn Reflectance, budget: Budget) -> Self {
         let samples = Samples::of(reflectance);
