@@ -18,8 +18,6 @@ layout(constant_id = 3) const bool KERNEL = false;
 #include "lobes.glsl"
 #include "list.glsl"
 #include "levels.glsl"
-#include "suns.glsl"
-#include "texel_kernel.glsl"
 
 layout(local_size_x = LIST_GROUP) in;
 
@@ -41,11 +39,10 @@ layout(constant_id = 5) const bool ALLOCATED = false;
 // Where the filter finds lobes: whether there are materials beside, which stay as they are.
 layout(constant_id = 10) const uint UNFILTERED = 1u;
 #include "approximation.glsl"
-// The most lobes that stand for a material, and whether what is left is stored as a factor on what they reflect.
-layout(constant_id = 14) const uint APPROXIMATING = 1u;
+#define CONTROL_BINDING 13
+#include "control_variate.glsl"
+// Whether what is left is stored as a factor on what the lobes reflect that stand for a material.
 layout(constant_id = 15) const uint RATIO = 0u;
-// Whether lobes are taken to be just what look-ups of them hold.
-layout(constant_id = 16) const uint EXACT = 0u;
 // Whether directions are drawn from the reflectance alone.
 layout(constant_id = 17) const uint ALONE = 0u;
 
@@ -65,9 +62,6 @@ layout(set = 2, binding = 7, rgba32f) uniform writeonly image2D odd; // of odd l
 layout(set = 2, binding = 8) uniform sampler2D normals;  // as the filter pass writes them
 layout(set = 2, binding = 9) uniform usampler2D factors;
 layout(set = 2, binding = 12) uniform sampler2D base; // radiance by those lobes, suns and exact lights
-layout(set = 2, binding = 13, std430) readonly buffer PrefilterSuns {
-    SunList suns;
-} prefilter;
 
 layout(push_constant) uniform Push {
     uint brdf_samples; // of a sample that stands for a pixel or more, as Directions::split of src/plan.rs shares them out; if ALLOCATED, each entry's own number is
@@ -120,63 +114,9 @@ bool lobed(Surface s) {
     return LOBED != 0u && (s.lobes.count > 0u || UNFILTERED == 0u);
 }
 
-// The lobes that stand for the material as they are looked up, which is between two levels (glsl/include/prefilter.glsl): direction;
-// exponent of a squared distance in the broader level, height there, height in the sharper one, whether that is the map;
-// factor on irradiance.
-vec3 approximating_direction[APPROXIMATING];
-float approximating_scale[APPROXIMATING];
-vec3 approximating_broad[APPROXIMATING];
-vec3 approximating_sharp[APPROXIMATING];
-bool approximating_map[APPROXIMATING];
-bool approximating_even[APPROXIMATING]; // the sharper level is one of the second image
-vec3 approximating_diffuse;
-
-void approximate(Surface s, Approximation a) {
-    approximating_diffuse = a.diffuse;
-    [[unroll]] for (uint i = 0u; i < APPROXIMATING; ++i) {
-        bool there = i < a.count;
-        ReflectedLobe lobe = approximation_lobe(s.material, s.lobes, a, there ? i : 0u, s.frame.view);
-        approximating_direction[i] = lobe.direction;
-        // As `prefiltered` has it; the map's bilinear look-ups are 3 factors of 2 sharper than the sharpest lobe.
-        vec4 scale = prefilter.suns.scale;
-        float steps = min(-log2(lobe.kappa * scale.x), scale.y);
-        steps = EXACT != 0u ? max(steps, 0.0) : steps;
-        bool map = steps < 0.0;
-        float whole = floor(steps);
-        float kappa = exp2(map ? 0.0 : -whole - 1.0) / scale.x, sharper = kappa * (map ? 8.0 : 2.0);
-        float weight = map ? 1.0 - min(-steps * scale.z, 1.0) : steps - whole;
-        vec3 amplitude = there ? lobe.weight : vec3(0.0);
-        approximating_scale[i] = -0.5 * kappa;
-        approximating_broad[i] = amplitude * (weight * vmf_normalisation(kappa));
-        approximating_sharp[i] = amplitude * ((1.0 - weight) * vmf_normalisation(sharper));
-        approximating_map[i] = map;
-        approximating_even[i] = fract(0.5 * whole) == 0.0;
-    }
-}
-
-// What they have in the place of reflectance times cosine, for light from local wi, which may be below the horizon.
-vec3 approximation(Surface s, vec3 wi) {
-    vec3 sum = approximating_diffuse * max(wi.z, 0.0);
-    [[unroll]] for (uint i = 0u; i < APPROXIMATING; ++i) {
-        vec3 d = wi - approximating_direction[i];
-        float broad = exp(approximating_scale[i] * dot(d, d)), sharp = broad * broad;
-        float fourth = sharp * sharp;
-        sharp = approximating_map[i] ? fourth * fourth : sharp;
-        if (EXACT != 0u) {
-            vec3 centre = to_world(s.frame, approximating_direction[i]), w = to_world(s.frame, wi);
-            float kappa = -2.0 * approximating_scale[i];
-            bool even = approximating_even[i];
-            broad = texel_kernel(centre, kappa, even ? 1.0 : 2.0, w) / vmf_normalisation(kappa);
-            sharp = texel_kernel(centre, 2.0 * kappa, even ? 2.0 : 1.0, w) / vmf_normalisation(2.0 * kappa);
-        }
-        sum += approximating_broad[i] * broad + approximating_sharp[i] * sharp;
-    }
-    return sum;
-}
-
 // What of reflectance times cosine light that is looked up does not have.
 vec3 remaining(Surface s, vec3 reflected, vec3 wi) {
-    return ESTIMATOR == ESTIMATOR_RESIDUAL ? reflected - approximation(s, wi) : reflected;
+    return ESTIMATOR == ESTIMATOR_RESIDUAL ? reflected - approximation(s.frame, wi) : reflected;
 }
 
 // Reflectance times the cosine for light from local wi, h the half vector, and in a the density per steradian of wi for the weights
@@ -350,7 +290,7 @@ void main() {
             store(p, l, vec3(nothing));
             return;
         }
-        approximate(s, a);
+        approximate(m, s.lobes, a, f.view);
         known = texelFetch(base, p, 0).rgb;
     }
     uvec2 seeds = sobol_seeds(seed);

@@ -8,7 +8,7 @@ use crate::gpu::image::Image;
 use crate::gpu::pipeline::BridgeSets;
 use crate::gpu::recorder::Recorder;
 use crate::pass::maps::MomentArrays;
-use crate::renderer::{Renderer, Surfaces};
+use crate::renderer::Renderer;
 use ash::vk;
 
 impl Renderer {
@@ -31,7 +31,7 @@ impl Renderer {
         probe: &crate::pass::probe::Probe,
         (input, count, output): (&Buffer, u32, &Buffer),
     ) -> Result<()> {
-        let (Some(environment), Some(Surfaces { images: materials, .. })) = (&self.environment, &self.materials) else {
+        let (Some(environment), Some((materials, _))) = (&self.environment, &self.materials) else {
             return Err(Error::CallOrder { called: "record_probe", before: "record_environment and record_materials" });
         };
         let uniform = inputs.uniform(&self.config, &self.targets.plan, [0, 0]);
@@ -55,17 +55,17 @@ impl Renderer {
 
     /// The arrays of a material's moments and of its cells, and its layers there.
     pub(crate) fn moments(&self, material: usize) -> Option<MomentArrays<'_>> {
-        self.materials.as_ref()?.images.maps.moments(material)
+        self.materials.as_ref()?.0.maps.moments(material)
     }
 
     /// The arrays of an object's frames and of the cells of its own in the last frame, and its layers there.
     pub(crate) fn object_cells(&self, object: u32) -> Option<MomentArrays<'_>> {
-        self.cells.as_ref()?.arrays(object, &self.materials.as_ref()?.images.maps)
+        self.cells.as_ref()?.arrays(object, &self.materials.as_ref()?.0.maps)
     }
 
     /// Bytes of the materials' lobe fits.
     pub(crate) fn fit_bytes(&self) -> u64 {
-        self.materials.as_ref().and_then(|m| m.images.fits.as_ref()).map_or(0, |fits| fits.size)
+        self.materials.as_ref().and_then(|(images, _)| images.fits.as_ref()).map_or(0, |fits| fits.size)
     }
 
     /// Layout of set 1.

@@ -8,6 +8,7 @@ pub mod frequency;
 pub mod gpu;
 #[cfg(feature = "offline")]
 mod inspect;
+mod kinds;
 pub mod light;
 pub mod material;
 pub mod moments;

@@ -7,10 +7,9 @@ use crate::gpu::pipeline::BridgeLayouts;
 use crate::gpu::retire::{Build, Retired};
 use crate::pass::gbuffer::GBuffer;
 use crate::pass::maps::MomentPasses;
-use crate::pass::materials::Kinds;
 use crate::pass::{
-    PassContext, allocate, bandwidth, base, brdf_map, classify, cluster_moments, curvature, environment_bandwidth, luminance,
-    prefilter, pyramid, residual_level, resolve, shade, texture_space, tonemap, upsample, vmf_mips,
+    PassContext, allocate, bandwidth, brdf_map, classify, cluster_moments, curvature, environment_bandwidth, luminance,
+    prefilter, pyramid, residual_level, resolve, texture_space, tonemap, upsample, vmf_mips,
 };
 use ash::vk;
 
@@ -36,35 +35,6 @@ pub(crate) struct Passes {
     pub upsample: Option<upsample::Upsample>,
     pub resolve: resolve::Resolve,
     pub tonemap: tonemap::Tonemap,
-}
-
-/// Passes that are compiled for the kinds of materials that there are.
-pub(crate) struct OfKinds {
-    pub kinds: Kinds,
-    /// Where light is looked up.
-    pub base: Option<base::Base>,
-    /// Where directions are drawn.
-    pub shade: Option<shade::Shade>,
-}
-
-impl OfKinds {
-    pub fn new(p: &mut PassContext<'_, '_>, config: &Config, kinds: Kinds) -> Result<Self> {
-        let (looked_up, drawn) = (config.estimator.looks_up(), config.estimator != Estimator::Preconvolved);
-        Ok(Self {
-            kinds,
-            base: looked_up.then(|| base::Base::new(p, config, kinds)).transpose()?,
-            shade: drawn.then(|| shade::Shade::new(p, config, config.coarsest() > 0, kinds)).transpose()?,
-        })
-    }
-
-    pub fn retire(self, bag: &mut Retired) {
-        if let Some(pass) = self.base {
-            pass.retire(bag);
-        }
-        if let Some(pass) = self.shade {
-            pass.retire(bag);
-        }
-    }
 }
 
 impl Passes {

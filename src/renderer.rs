@@ -13,6 +13,7 @@ use crate::gpu::recorder::{Recorder, States};
 use crate::gpu::retire::{Build, Retired};
 use crate::gpu::sampler::Samplers;
 use crate::gpu::timer::{FrameTimings, GpuTimer};
+use crate::kinds::OfKinds;
 use crate::light;
 use crate::pass::environment::EnvironmentImages;
 use crate::pass::gbuffer;
@@ -22,7 +23,7 @@ use crate::pass::{
     FrameUniform, allocate, bandwidth, base, classify, curvature, filter, level, luminance, pyramid, residual_level, resolve,
     shade, texture_space, tonemap, upsample, vmf_mips,
 };
-use crate::passes::{OfKinds, Passes};
+use crate::passes::Passes;
 use crate::plan::{Directions, LIGHT_BYTES};
 use crate::targets::Targets;
 use ash::vk;
@@ -39,13 +40,6 @@ impl Drop for Undestroyed {
     fn drop(&mut self) {
         log::error!("a renderer was dropped without `destroy` and its handles leak");
     }
-}
-
-/// Materials, with the passes that are compiled for their maps and for their kinds.
-pub(crate) struct Surfaces {
-    pub images: MaterialImages,
-    pub filter: filter::Filter,
-    pub of_kinds: OfKinds,
 }
 
 /// The renderer: records frames into the host's command buffers. It never submits and never waits.
@@ -67,7 +61,10 @@ pub struct Renderer {
     /// Whether `targets` hold a frame.
     shown: bool,
     pub(crate) environment: Option<EnvironmentImages>,
-    pub(crate) materials: Option<Surfaces>,
+    /// With the pass that is compiled for their maps.
+    pub(crate) materials: Option<(MaterialImages, filter::Filter)>,
+    /// Those that are compiled for their kinds.
+    pub(crate) of_kinds: Option<OfKinds>,
     /// Of objects, where these have some of their own.
     pub(crate) cells: Option<ObjectCells>,
     undestroyed: Undestroyed,
@@ -119,6 +116,7 @@ impl Renderer {
             shown: false,
             environment: None,
             materials: None,
+            of_kinds: None,
             cells: None,
             undestroyed: Undestroyed,
         })
@@ -137,8 +135,8 @@ impl Renderer {
     pub unsafe fn record(&mut self, cmd: vk::CommandBuffer, inputs: &FrameInputs<'_>) -> Result<()> {
         inputs.check(&self.config, self.targets.plan.shading)?;
         let before = "record_environment and record_materials";
-        let (Some(environment), Some(Surfaces { images: materials, filter, of_kinds })) = (&self.environment, &self.materials)
-        else {
+        let set_up = (&self.environment, &self.materials, &self.of_kinds);
+        let (Some(environment), Some((materials, filter)), Some(of_kinds)) = set_up else {
             return Err(Error::CallOrder { called: "record", before });
         };
         if let GBufferInput::Draws(draws) = inputs.gbuffer {
@@ -390,9 +388,11 @@ impl Renderer {
         if let Some(cells) = self.cells {
             cells.retire(&mut self.states, &mut bag);
         }
-        if let Some(Surfaces { images, filter, of_kinds }) = self.materials {
-            images.retire(&mut self.states, &mut bag);
-            of_kinds.retire(&mut bag);
+        if let Some(passes) = self.of_kinds {
+            passes.retire(&mut bag);
+        }
+        if let Some((materials, filter)) = self.materials {
+            materials.retire(&mut self.states, &mut bag);
             filter.retire(&mut bag);
         }
         self.targets.retire(&mut self.states, &mut bag);

@@ -8,6 +8,7 @@ use crate::gpu::pipeline::BridgeLayouts;
 use crate::gpu::recorder::Recorder;
 use crate::gpu::retire::{Build, Retired};
 use crate::gpu::timer::FrameTimings;
+use crate::kinds::OfKinds;
 use crate::material::Material;
 use crate::pass::environment::{Analyses, EnvironmentUpload};
 use crate::pass::gbuffer::{self, Draw};
@@ -15,8 +16,8 @@ use crate::pass::maps::Reading;
 use crate::pass::materials::{MaterialsUpload, Uploading};
 use crate::pass::object_cells::{ObjectCells, Seats};
 use crate::pass::{PassContext, brdf_map, cluster_moments, filter, vmf_mips};
-use crate::passes::{OfKinds, layout};
-use crate::renderer::{Renderer, Surfaces};
+use crate::passes::layout;
+use crate::renderer::Renderer;
 use crate::sampling::LatLong;
 use ash::vk;
 
@@ -73,7 +74,7 @@ impl Renderer {
         let (passes, samplers) = (self.passes.moments.as_ref(), &self.samplers);
         let (eps, estimator) = (config.predicts().then_some(config.eps), config.estimator);
         let budget = config.fit_budget();
-        let kept = self.materials.as_ref().map(|m| m.of_kinds.kinds);
+        let kept = self.of_kinds.as_ref().map(|passes| passes.kinds);
         let (mut upload, filter, of_kinds) = Build::run(&self.cx, memory, |build| {
             let reading = Reading { filter, bins, rule, widened, passes, samplers };
             let upload = MaterialsUpload::new(build, materials, &Uploading { reading, eps, estimator, budget })?;
@@ -104,20 +105,13 @@ impl Renderer {
             // They are made from the former materials' lobes.
             former.retire(&mut self.states, &mut bag);
         }
-        let former = self.materials.take();
-        let (former, kept) = former.map(|m| ((m.images, m.filter), m.of_kinds)).unzip();
-        if let Some((images, filter)) = former {
-            images.retire(&mut self.states, &mut bag);
-            filter.retire(&mut bag);
+        if let Some((former, pass)) = self.materials.replace((fresh, filter)) {
+            former.retire(&mut self.states, &mut bag);
+            pass.retire(&mut bag);
         }
-        let (of_kinds, unused) = match of_kinds {
-            Some(fresh) => (Some(fresh), kept),
-            None => (kept, None),
-        };
-        if let Some(unused) = unused {
-            unused.retire(&mut bag);
+        if let Some(former) = of_kinds.and_then(|fresh| self.of_kinds.replace(fresh)) {
+            former.retire(&mut bag);
         }
-        self.materials = of_kinds.map(|of_kinds| Surfaces { images: fresh, filter, of_kinds });
         Ok(bag)
     }
 
@@ -131,7 +125,7 @@ impl Renderer {
     pub fn reserve_cells(&mut self, draws: &[Draw], memory: &mut dyn HostAllocator) -> Result<Retired> {
         let mut bag = Retired::default();
         let (Bins::Camera, Some((_, mips, _))) = (self.config.bins, &self.passes.moments) else { return Ok(bag) };
-        let Some(Surfaces { images: materials, .. }) = &self.materials else {
+        let Some((materials, _)) = &self.materials else {
             return Err(Error::CallOrder { called: "reserve_cells", before: "record_materials" });
         };
         gbuffer::check(draws)?;
@@ -149,7 +143,7 @@ impl Renderer {
     /// Texels of the map of which each draw of a material makes cells of its own, if it does: what
     /// [`chart::check`](crate::distribution::chart::check) takes.
     pub fn cell_map(&self, material: u32) -> Option<[u32; 2]> {
-        Some(self.materials.as_ref()?.images.maps.divided(material)?.size)
+        Some(self.materials.as_ref()?.0.maps.divided(material)?.size)
     }
 
     /// GPU times of the last [`Self::record_materials`], which has run; `None` without timestamps.

@@ -3,48 +3,20 @@
 #![cfg(feature = "offline")]
 
 mod support {
+    pub mod filters;
     pub mod frames;
 }
 
-use glam::{DVec3, Mat4, Vec3};
+use glam::DVec3;
 use passband::moments::Moments;
 use passband::offline::builtin;
 use passband::offline::headless::{Headless, Options};
 use passband::offline::reference::Options as Quadrature;
 use passband::offline::session::Session;
-use passband::offline::texture::{Encoding, Image, Part};
 use passband::offline::world::World;
-use passband::reflectance::{BlinnPhong, Lobe, Model, Vmf};
-use passband::{Config, Division, Estimator, Filter, Light, Maps, Requirements, Roughness, Texture};
-use std::f32::consts::TAU;
-use std::sync::Arc;
+use passband::{Config, Division, Estimator, Filter, Light, Maps, Requirements, Roughness};
+use support::filters::{Minified, blinn_phong, lobes, normals, plane, roughness, scene};
 use support::frames::{Stage, config, expected_with, furthest, ggx, ratio, tiles, world};
-
-fn texels<T>([w, h]: [u32; 2], f: impl Fn(f32, f32) -> T) -> Vec<T> {
-    (0..w * h).map(|i| f(((i % w) as f32 + 0.5) / w as f32, ((i / w) as f32 + 0.5) / h as f32)).collect()
-}
-
-/// Bumps that differ along u and v.
-fn normals(size: [u32; 2], height: f32) -> Option<Arc<Texture>> {
-    let texel = |u: f32, v: f32| {
-        Vec3::new(height * (TAU * 6.0 * u).sin() + 0.1, 0.7 * height * (TAU * (4.0 * v + u)).cos() - 0.15, 1.0).normalize()
-    };
-    Some(Arc::new(Texture::normals(size, &texels(size, |u, v| texel(u, v).to_array())).unwrap()))
-}
-
-fn roughness(size: [u32; 2], low: f32, high: f32) -> Option<(Arc<Texture>, Roughness)> {
-    let texel = |u: f32, v: f32| low * (high / low).powf(0.5 + 0.5 * (TAU * (3.0 * u + 2.0 * v)).sin());
-    Some((Arc::new(Texture::scalar(size, &texels(size, texel)).unwrap()), Roughness::Alpha))
-}
-
-fn blinn_phong() -> Model {
-    Model::BlinnPhong(BlinnPhong { exponent: 90.0, specular: DVec3::new(0.5, 0.6, 0.7), albedo: DVec3::splat(0.3) })
-}
-
-fn lobes(all: &[(f64, f64)]) -> Model {
-    let lobe = |&(x, kappa)| Lobe { mu: DVec3::new(x, 0.0, 1.0), kappa, weight: 0.4 };
-    Model::Vmf(Arc::new(Vmf::new(&all.iter().map(lobe).collect::<Vec<_>>()).unwrap()))
-}
 
 fn session(world: &World, config: &Config) -> Session {
     let options = Options { device: Some("llvmpipe".into()), validate: true };
@@ -59,9 +31,13 @@ fn materials() -> World {
     let with = |normal, roughness| Maps { normal, roughness, ..Maps::default() };
     let all = [
         ("ggx", ggx(0.3, DVec3::ONE, DVec3::ZERO), with(normals(odd, 0.5), None)),
-        ("rough ggx", ggx(0.3, DVec3::ONE, DVec3::ZERO), with(normals(odd, 0.3), roughness([32, 64], 0.02, 0.6))),
-        ("rough blinn-phong", blinn_phong(), with(normals(odd, 0.2), roughness(odd, 0.1, 0.4))),
-        ("two lobes", lobes(&[(0.7, 30.0), (-0.5, 60.0)]), with(normals(odd, 0.4), roughness(odd, 0.1, 0.8))),
+        (
+            "rough ggx",
+            ggx(0.3, DVec3::ONE, DVec3::ZERO),
+            with(normals(odd, 0.3), roughness([32, 64], Roughness::Alpha, 0.02, 0.6)),
+        ),
+        ("rough blinn-phong", blinn_phong(), with(normals(odd, 0.2), roughness(odd, Roughness::Alpha, 0.1, 0.4))),
+        ("two lobes", lobes(&[(0.7, 30.0), (-0.5, 60.0)]), with(normals(odd, 0.4), roughness(odd, Roughness::Alpha, 0.1, 0.8))),
         ("no map", blinn_phong(), Maps::default()),
     ];
     scene.materials = all
@@ -163,20 +139,10 @@ fn peaks_are_stored_as_they_are() {
     }
 }
 
-/// One mesh, mirrored and stretched, under a small sun.
-fn scene(mesh: &str, model: Model, maps: Maps) -> World {
-    let mut world = world(mesh, 128, model, builtin::environment("sun-sky", 128).unwrap());
-    let object = &mut world.objects[0];
-    Arc::make_mut(&mut object.mesh).compute_tangents();
-    object.transform = Mat4::from_rotation_y(0.8) * Mat4::from_scale(Vec3::new(-1.0, 0.9, 1.0));
-    world.materials[0].maps = maps;
-    world
-}
-
 #[test]
 fn frames_are_those_of_the_quadrature() {
     let tiled = |normal, roughness| Maps { normal, roughness, tiling: [3.0, 2.0], ..Maps::default() };
-    let all = |size| tiled(normals(size, 0.3), roughness(size, 0.1, 0.4));
+    let all = |size| tiled(normals(size, 0.3), roughness(size, Roughness::Alpha, 0.1, 0.4));
     let metal = || ggx(0.15, DVec3::splat(0.9), DVec3::splat(0.3));
     let two = || lobes(&[(0.6, 60.0), (-0.4, 30.0)]);
     let (odd, few) = ([67, 45], [13, 9]);
@@ -214,48 +180,13 @@ fn frames_are_those_of_the_quadrature() {
     assert!(wrong.is_empty(), "{wrong:?}");
 }
 
-/// The built-in map `name` on a tilted plane under a light, minified.
-fn plane(name: &str, light: Light) -> World {
-    let normal = Image::builtin(name, Part::Normal).unwrap().normals(Encoding::Signed, true, 1.0).unwrap();
-    let kappa = Image::builtin(name, Part::Concentration).unwrap().roughness().unwrap();
-    let model = lobes(&[(0.0, 100.0)]);
-    let mut world = world("plane", 16, model, builtin::environment("constant", 16).unwrap());
-    Arc::make_mut(&mut world.objects[0].mesh).compute_tangents();
-    world.objects[0].transform = Mat4::from_rotation_x(0.9);
-    world.materials[0].maps =
-        Maps { normal: Some(Arc::new(normal)), roughness: Some((Arc::new(kappa), Roughness::Kappa)), ..Maps::default() };
-    world.environment = None;
-    world.lights = vec![light];
-    world
-}
-
 #[test]
 fn clusters_are_nearer_to_the_truth_than_cells() {
-    const SIDE: usize = 24;
-    const FINER: usize = 16;
     let lamp = Light::Point { position: [0.5, 1.0, 1.2], intensity: [1.0; 3] };
-    let scene = plane("bumps", lamp);
-    let frame = |side: usize, filter| {
-        let config = Config { filter, ..config([side as u32; 2], Estimator::Mis, 2) };
-        Stage::new(&scene, &config).frame([0, 0])
-    };
-    let fine = frame(SIDE * FINER, Filter::Point);
-    let below = |i: usize| {
-        let (x, y) = (i % SIDE * FINER, i / SIDE * FINER);
-        (0..FINER * FINER).map(move |k| (y + k / FINER) * SIDE * FINER + x + k % FINER)
-    };
-    let inside: Vec<_> = (0..SIDE * SIDE).filter(|i| below(*i).all(|k| fine.coverage(k) == 1.0)).collect();
-    assert!(inside.len() > 80, "{}", inside.len());
-    let truth: Vec<_> =
-        inside.iter().map(|i| below(*i).map(|k| fine.radiance(k)).sum::<DVec3>() / (FINER * FINER) as f64).collect();
-    let squared: f64 = truth.iter().map(|t| t.length_squared()).sum();
-    let error = |filter| {
-        let image = frame(SIDE, filter);
-        let off: f64 = inside.iter().zip(&truth).map(|(i, t)| (image.radiance(*i) - t).length_squared()).sum();
-        (off / squared).sqrt()
-    };
+    let minified = Minified::new(plane("bumps", lobes(&[(0.0, 100.0)]), lamp), 24);
+    assert!(minified.pixels() > 80, "{}", minified.pixels());
     let all = [Filter::Clusters, Filter::Vmf8, Filter::ToksvigLobe, Filter::Fournier7];
-    let [clusters, vmf8, toksvig, fournier] = all.map(error);
+    let [clusters, vmf8, toksvig, fournier] = all.map(|filter| minified.error(filter));
     println!("bumps: clusters {clusters:.3}, vmf8 {vmf8:.3}, toksvig-lobe {toksvig:.3}, fournier7 {fournier:.3}");
     assert!(clusters < 0.7 * vmf8 && clusters < 0.5 * toksvig && clusters < 1.4 * fournier);
 }

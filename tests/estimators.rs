@@ -90,9 +90,12 @@ fn under_constant_light_an_object_shows_its_albedo() {
     }
 }
 
+/// For the packing of tables and for the quadrature.
+const ROUNDING: f64 = 5e-4;
+
 /// That the mean over `frames` seeds of the interior pixels' sum is the reference's, in each channel: within 4 standard errors,
-/// which must be below `precision` of it, and 0.05 % for the packing of tables and for the quadrature.
-fn assert_unbiased(label: &str, world: &World, config: &Config, frames: u32, precision: f64) {
+/// which must be below `precision` of it, and `bias`.
+fn assert_unbiased(label: &str, world: &World, config: &Config, frames: u32, [precision, bias]: [f64; 2]) {
     let expected = expected(world, EXTENT, |interior| interior);
     let truth: DVec3 = expected.pixels.iter().map(|(_, radiance)| *radiance).sum();
     let mut stage = Stage::new(world, config);
@@ -107,7 +110,7 @@ fn assert_unbiased(label: &str, world: &World, config: &Config, frames: u32, pre
     println!("{label}: {ratios:.5?}, standard errors {errors:.5?}");
     for (ratio, error) in ratios.into_iter().zip(errors) {
         assert!(error < precision, "{label}: a standard error of {error}");
-        assert!((ratio - 1.0).abs() <= 4.0 * error + 5e-4, "{label}: {ratio} +- {error}");
+        assert!((ratio - 1.0).abs() <= 4.0 * error + bias, "{label}: {ratio} +- {error}");
     }
 }
 
@@ -118,8 +121,10 @@ fn every_estimator_has_the_reference_as_its_mean() {
         let world = world(mesh, 48, model, sky("studio"));
         for estimator in [Estimator::Mis, Estimator::Brdf, Estimator::BrdfRandom, Estimator::Cv, Estimator::Residual] {
             let exact = Config { exact_lobes: true, ..config(EXTENT, estimator, 128) };
-            assert_unbiased(&format!("{mesh}, {estimator:?}"), &world, &exact, 256, 2e-3);
+            assert_unbiased(&format!("{mesh}, {estimator:?}"), &world, &exact, 256, [2e-3, ROUNDING]);
         }
+        // What looks light up is nearly what the estimate takes it for.
+        assert_unbiased(&format!("{mesh}, look-ups"), &world, &config(EXTENT, Estimator::Cv, 128), 256, [2e-3, 2e-3]);
     }
 }
 
@@ -128,7 +133,7 @@ fn few_directions_are_as_unbiased_as_many() {
     let world = world("sphere", 64, table("metallic-paint"), sky("studio"));
     for (directions, frames) in [(2, 2048), (3, 2048), (64, 128)] {
         let config = config(EXTENT, Estimator::Mis, directions);
-        assert_unbiased(&format!("{directions} directions"), &world, &config, frames, 2e-3);
+        assert_unbiased(&format!("{directions} directions"), &world, &config, frames, [2e-3, ROUNDING]);
     }
 }
 

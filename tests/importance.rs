@@ -1,6 +1,7 @@
 //! Importance tables over the view angle: what is drawn has the density that is claimed, and estimates have the right mean.
 
 mod support {
+    pub mod half_vectors;
     pub mod statistics;
 }
 
@@ -10,6 +11,7 @@ use passband::reflectance::{BlinnPhong, Ggx, ImportanceTable, Lobe, Reflectance,
 use passband::sampling::{luminance, sobol};
 use std::f64::consts::{FRAC_PI_2, PI};
 use std::sync::LazyLock;
+use support::half_vectors::over_half_vectors;
 use support::statistics::{Mean, chi_square_p};
 
 const P_VALUE: f64 = 1e-4;
@@ -63,19 +65,6 @@ impl Reflectance for Broken {
 fn viewer(degrees: f64) -> DVec3 {
     let (sin, cos) = degrees.to_radians().sin_cos();
     DVec3::new(sin, 0.0, cos)
-}
-
-/// Midpoint quadrature over half vectors above the plane, fine near the normal (theta = (pi/2) x^2).
-fn over_half_vectors(n: [usize; 2], mut f: impl FnMut(DVec3, f64)) {
-    for i in 0..n[0] {
-        let x = (i as f64 + 0.5) / n[0] as f64;
-        let theta = FRAC_PI_2 * x * x;
-        for j in 0..n[1] {
-            let phi = 2.0 * PI * (j as f64 + 0.5) / n[1] as f64;
-            let h = DVec3::new(theta.sin() * phi.cos(), theta.sin() * phi.sin(), theta.cos());
-            f(h, theta.sin() * PI * x / n[0] as f64 * 2.0 * PI / n[1] as f64);
-        }
-    }
 }
 
 fn reflect(wo: DVec3, h: DVec3) -> Option<(DVec3, f64)> {

@@ -1,6 +1,7 @@
 //! Fits of reflectances by lobes, and importance tables of what they leave.
 
 mod support {
+    pub mod half_vectors;
     pub mod statistics;
 }
 
@@ -9,8 +10,9 @@ use passband::distribution::fit::{FitNode, NODES};
 use passband::distribution::{Budget, LobeFit};
 use passband::reflectance::{Ggx, ImportanceTable, Lobe, Reflectance, Vmf, stand_in, turned};
 use passband::sampling::sobol;
-use std::f64::consts::{FRAC_PI_2, PI};
+use std::f64::consts::PI;
 use std::sync::LazyLock;
+use support::half_vectors::over_half_vectors;
 use support::statistics::Mean;
 
 type Case = (&'static str, Box<dyn Reflectance>, LobeFit);
@@ -133,19 +135,6 @@ fn what_cannot_be_fitted_is_black() {
         ImportanceTable::build_residual(&Broken(value), &fit);
         let sum: f64 = fit.nodes().iter().map(|n| n.evaluate(DVec3::Z).max_element()).sum();
         assert!(sum == 0.0, "{value}: {sum}");
-    }
-}
-
-/// Midpoint quadrature over half vectors above the plane, fine near the normal (theta = (pi/2) x^2).
-fn over_half_vectors(n: [usize; 2], mut f: impl FnMut(DVec3, f64)) {
-    for i in 0..n[0] {
-        let x = (i as f64 + 0.5) / n[0] as f64;
-        let theta = FRAC_PI_2 * x * x;
-        for j in 0..n[1] {
-            let phi = 2.0 * PI * (j as f64 + 0.5) / n[1] as f64;
-            let h = DVec3::new(theta.sin() * phi.cos(), theta.sin() * phi.sin(), theta.cos());
-            f(h, theta.sin() * PI * x / n[0] as f64 * 2.0 * PI / n[1] as f64);
-        }
     }
 }
 

@@ -3,53 +3,27 @@
 #![cfg(feature = "offline")]
 
 mod support {
+    pub mod filters;
     pub mod frames;
 }
 
-use glam::{DVec3, Mat4, Vec3};
+use glam::{DVec3, Vec3};
 use passband::distribution::Filtered;
 use passband::moments::Moments;
 use passband::offline::builtin;
 use passband::offline::headless::{Headless, Options};
 use passband::offline::reference::Options as Quadrature;
 use passband::offline::session::{MomentLevels, Session};
-use passband::offline::texture::{Encoding, Image, Part};
 use passband::offline::world::World;
-use passband::reflectance::{BlinnPhong, Lobe, Model, Vmf};
+use passband::reflectance::Model;
 use passband::{Config, Division, Estimator, Filter, Light, Maps, Requirements, Roughness, Sampling, Texture};
-use std::f32::consts::TAU;
 use std::sync::Arc;
+use support::filters::{Minified, blinn_phong, lobes, normals, plane, roughness, scene, texels};
 use support::frames::{Stage, config, expected_with, furthest, ggx, ratio, table, tiles, world};
 
 /// Those that store moments.
 fn filters() -> impl Iterator<Item = Filter> {
     Filter::stored()
-}
-
-fn texels<T>([w, h]: [u32; 2], f: impl Fn(f32, f32) -> T) -> Vec<T> {
-    (0..w * h).map(|i| f(((i % w) as f32 + 0.5) / w as f32, ((i / w) as f32 + 0.5) / h as f32)).collect()
-}
-
-/// Bumps that differ along u and v.
-fn normals(size: [u32; 2], height: f32) -> Option<Arc<Texture>> {
-    let texel = |u: f32, v: f32| {
-        Vec3::new(height * (TAU * 6.0 * u).sin() + 0.1, 0.7 * height * (TAU * (4.0 * v + u)).cos() - 0.15, 1.0).normalize()
-    };
-    Some(Arc::new(Texture::normals(size, &texels(size, |u, v| texel(u, v).to_array())).unwrap()))
-}
-
-fn roughness(size: [u32; 2], kind: Roughness, low: f32, high: f32) -> Option<(Arc<Texture>, Roughness)> {
-    let texel = |u: f32, v: f32| low * (high / low).powf(0.5 + 0.5 * (TAU * (3.0 * u + 2.0 * v)).sin());
-    Some((Arc::new(Texture::scalar(size, &texels(size, texel)).unwrap()), kind))
-}
-
-fn blinn_phong() -> Model {
-    Model::BlinnPhong(BlinnPhong { exponent: 90.0, specular: DVec3::new(0.5, 0.6, 0.7), albedo: DVec3::splat(0.3) })
-}
-
-fn lobes(all: &[(f64, f64)]) -> Model {
-    let lobe = |&(x, kappa)| Lobe { mu: DVec3::new(x, 0.0, 1.0), kappa, weight: 0.4 };
-    Model::Vmf(Arc::new(Vmf::new(&all.iter().map(lobe).collect::<Vec<_>>()).unwrap()))
 }
 
 /// Materials with maps of odd and of different sizes, few enough that none is resampled.
@@ -185,16 +159,6 @@ fn passes_store_what_the_twin_does() {
     }
 }
 
-/// One mesh, mirrored and stretched, under a small sun.
-fn scene(mesh: &str, model: Model, maps: Maps) -> World {
-    let mut world = world(mesh, 128, model, builtin::environment("sun-sky", 128).unwrap());
-    let object = &mut world.objects[0];
-    Arc::make_mut(&mut object.mesh).compute_tangents();
-    object.transform = Mat4::from_rotation_y(0.8) * Mat4::from_scale(Vec3::new(-1.0, 0.9, 1.0));
-    world.materials[0].maps = maps;
-    world
-}
-
 #[test]
 fn frames_are_those_of_the_quadrature() {
     let tiled = |normal, roughness| Maps { normal, roughness, tiling: [3.0, 2.0], ..Maps::default() };
@@ -313,49 +277,16 @@ fn constant_maps_change_nothing() {
     }
 }
 
-/// The built-in map `name` on a tilted plane under a light, minified.
-fn plane(name: &str, light: Light) -> World {
-    let normal = Image::builtin(name, Part::Normal).unwrap().normals(Encoding::Signed, true, 1.0).unwrap();
-    let kappa = Image::builtin(name, Part::Concentration).unwrap().roughness().unwrap();
-    let mut world = world("plane", 16, ggx(0.3, DVec3::splat(0.9), DVec3::ZERO), builtin::environment("constant", 16).unwrap());
-    Arc::make_mut(&mut world.objects[0].mesh).compute_tangents();
-    world.objects[0].transform = Mat4::from_rotation_x(0.9);
-    world.materials[0].maps =
-        Maps { normal: Some(Arc::new(normal)), roughness: Some((Arc::new(kappa), Roughness::Kappa)), ..Maps::default() };
-    world.environment = None;
-    world.lights = vec![light];
-    world
-}
-
 #[test]
 fn errors_fall_in_the_order_of_the_study() {
-    const SIDE: usize = 48;
-    const FINER: usize = 16;
     let sun = Light::Directional { direction: [-0.2, -0.5, -0.8], irradiance: [1.0; 3] };
     let lamp = Light::Point { position: [0.5, 1.0, 1.2], intensity: [1.0; 3] };
     for (name, light) in [("bumps", sun), ("dunes", lamp)] {
-        let scene = plane(name, light);
-        let frame = |side: usize, filter| {
-            let config = Config { filter, ..config([side as u32; 2], Estimator::Mis, 2) };
-            Stage::new(&scene, &config).frame([0, 0])
-        };
-        let fine = frame(SIDE * FINER, Filter::Point);
-        let below = |i: usize| {
-            let (x, y) = (i % SIDE * FINER, i / SIDE * FINER);
-            (0..FINER * FINER).map(move |k| (y + k / FINER) * SIDE * FINER + x + k % FINER)
-        };
-        let inside: Vec<_> = (0..SIDE * SIDE).filter(|i| below(*i).all(|k| fine.coverage(k) == 1.0)).collect();
-        assert!(inside.len() > 400, "{}", inside.len());
-        let truth: Vec<_> =
-            inside.iter().map(|i| below(*i).map(|k| fine.radiance(k)).sum::<DVec3>() / (FINER * FINER) as f64).collect();
-        let squared: f64 = truth.iter().map(|t| t.length_squared()).sum();
-        let error = |filter| {
-            let image = frame(SIDE, filter);
-            let off: f64 = inside.iter().zip(&truth).map(|(i, t)| (image.radiance(*i) - t).length_squared()).sum();
-            (off / squared).sqrt()
-        };
+        let model = ggx(0.3, DVec3::splat(0.9), DVec3::ZERO);
+        let minified = Minified::new(plane(name, model, light), 48);
+        assert!(minified.pixels() > 400, "{}", minified.pixels());
         let [point, naive, fixed, toksvig, vmf1] =
-            [Filter::Point, Filter::Naive, Filter::Fixed, Filter::Toksvig, Filter::Vmf1].map(error);
+            [Filter::Point, Filter::Naive, Filter::Fixed, Filter::Toksvig, Filter::Vmf1].map(|filter| minified.error(filter));
         println!("{name}: point {point:.3}, naive {naive:.3}, fixed {fixed:.3}, toksvig {toksvig:.3}, vmf1 {vmf1:.3}");
         assert!((vmf1 / toksvig - 1.0).abs() < 0.3, "{name}: toksvig {toksvig:.3}, vmf1 {vmf1:.3}");
         for worse in [point, naive, fixed] {

@@ -2,17 +2,18 @@
 #![cfg(feature = "offline")]
 
 mod support {
+    pub mod filters;
     pub mod frames;
 }
 
-use glam::{DVec3, Mat4, Vec3};
-use passband::offline::builtin;
+use glam::{DVec3, Vec3};
 use passband::offline::world::World;
 use passband::reflectance::{BlinnPhong, Lobe, Model, Vmf};
 use passband::{Estimator, Maps, Roughness, Texture};
 use std::f32::consts::TAU;
 use std::sync::Arc;
-use support::frames::{Stage, config, expected, furthest, ggx, ratio, table, tiles, world};
+use support::filters::scene;
+use support::frames::{Stage, config, expected, furthest, ggx, ratio, table, tiles};
 
 /// As for plain surfaces (tests/right.rs).
 const MEAN: f64 = 0.003;
@@ -62,16 +63,6 @@ fn blinn_phong() -> Model {
 fn cloth() -> Model {
     let lobe = |x, y, kappa| Lobe { mu: DVec3::new(x, y, 1.0), kappa, weight: 0.4 };
     Model::Vmf(Arc::new(Vmf::new(&[lobe(0.7, 0.0, 30.0), lobe(-0.2, 0.5, 60.0)]).unwrap()))
-}
-
-/// One mesh, mirrored and stretched as a scene may have it, under a small sun.
-fn scene(mesh: &str, model: Model, maps: Maps) -> World {
-    let mut world = world(mesh, 128, model, builtin::environment("sun-sky", 128).unwrap());
-    let object = &mut world.objects[0];
-    Arc::make_mut(&mut object.mesh).compute_tangents();
-    object.transform = Mat4::from_rotation_y(0.8) * Mat4::from_scale(Vec3::new(-1.0, 0.9, 1.0));
-    world.materials[0].maps = maps;
-    world
 }
 
 fn check(name: &str, world: &World) {

@@ -1,8 +1,33 @@
-//! The lobe fits of materials as `glsl/include/fit.glsl` reads them.
+//! The lobe fits of materials, and how `glsl/include/fit.glsl` reads them.
 
 use crate::distribution::fit::{FitLobe, LobeFit};
+use crate::distribution::fitter::Budget;
+use crate::material::Material;
+use crate::reflectance::Model;
+use crate::reflectance::atlas::same_table;
 use glam::DVec3;
 use std::sync::Arc;
+
+/// The fits of materials that one stands for: not where maps, the filter (`found`) or the mesh's curvature (`widened`) change their
+/// lobes. Those that materials do not bring are built, one for all that share a table.
+pub(crate) fn of(materials: &[Material], found: &[bool], widened: bool, budget: Budget) -> Vec<Option<Arc<LobeFit>>> {
+    let mut built: Vec<(&Model, Arc<LobeFit>)> = Vec::new();
+    let mut all = Vec::with_capacity(materials.len());
+    for (material, found) in materials.iter().zip(found) {
+        let model = &material.model;
+        let table = matches!(model, Model::Table(_) | Model::Turned(_));
+        let changed = *found || widened || !material.keeps_model();
+        if changed && !table {
+            all.push(None);
+            continue;
+        }
+        let shared = built.iter().find(|(known, _)| same_table(known, model)).map(|(_, fit)| Arc::clone(fit));
+        let fit = material.lobe_fit.clone().or(shared).unwrap_or_else(|| Arc::new(LobeFit::build(model, budget)));
+        built.push((model, Arc::clone(&fit)));
+        all.push(Some(fit));
+    }
+    all
+}
 
 /// Fits of all materials, packed.
 pub(crate) struct Packed {

@@ -1,9 +1,9 @@
 //! Materials' textures on the device: layers of arrays by size and format, and where each material's maps are.
 
 use crate::config::Bins;
+use crate::distribution::Filter;
 use crate::distribution::effective::Rule;
 use crate::distribution::filter::Storage;
-use crate::distribution::{Filter, MOST_BASE_LOBES};
 use crate::error::{Error, Result};
 use crate::gpu::access::Access;
 use crate::gpu::buffer::Buffer;
@@ -12,39 +12,19 @@ use crate::gpu::recorder::{Recorder, States};
 use crate::gpu::retire::{Build, Retired};
 use crate::gpu::sampler::Samplers;
 use crate::gpu::upload::{BufferUpload, ImageUpload};
-use crate::material::{Material, Roughness};
+use crate::material::Material;
 use crate::moments::{Base, BaseLobes, Parameter};
 use crate::pass::brdf_map::{self, BrdfMap, Group, Layers, Place, Source};
 use crate::pass::cluster_moments::{self, ClusterMoments};
 use crate::pass::kept::{self, Table};
+use crate::pass::map_record::{Record, rule};
 use crate::pass::vmf_mips::{self, VmfMips};
-use crate::reflectance::Model;
 use crate::texture::classes::MAX_CLASSES;
 use crate::texture::{Class, Classes, Format, Slots};
 use ash::vk;
-use bytemuck::{Pod, Zeroable};
 
 /// Classes that hold albedo, specular, normal and roughness maps, moments and cells, one bit each.
 pub(crate) type Uses = [u32; 6];
-
-/// Mirrors `MapRecord` in `glsl/filter.comp`.
-#[repr(C)]
-#[derive(Clone, Copy, Pod, Zeroable)]
-struct Record {
-    places: [u32; 4],
-    tiling: [f32; 2],
-    rule: [f32; 2],
-    without: f32,
-    moments: u32,
-    cells: u32,
-    lobes: u32,
-    weights: [f32; MOST_BASE_LOBES],
-    count: u32,
-    upright: u32,
-    concentration: f32,
-    facing: f32,
-    clusters: [u32; 4],
-}
 
 /// The passes over the maps of materials: the last if the filter has clusters.
 pub(crate) type MomentPasses = (BrdfMap, VmfMips, Option<ClusterMoments>);
@@ -140,23 +120,6 @@ impl Made {
         }
     }
 }
-
-/// How the shader turns a roughness map's value into alpha, and the greatest alpha that comes of it.
-fn rule(material: &Material) -> [f32; 2] {
-    let Some((_, kind)) = &material.maps.roughness else {
-        return [0.0, if matches!(material.model, Model::Vmf(_)) { MOST_ALPHA } else { 1.0 }];
-    };
-    match (&material.model, kind) {
-        (Model::Vmf(_), Roughness::Alpha) => [0.0, MOST_ALPHA],
-        (Model::Vmf(_), Roughness::Kappa) => [1.0, MOST_ALPHA],
-        (_, Roughness::Alpha) => [0.0, 1.0],
-        (Model::BlinnPhong(_), Roughness::Kappa) => [2.0, 1.0],
-        (_, Roughness::Kappa) => [1.0, 1.0],
-    }
-}
-
-/// Of a lobe without concentration, in 16-bit floating point.
-const MOST_ALPHA: f32 = 6e4;
 
 fn format(format: Format) -> vk::Format {
     match format {
@@ -267,33 +230,6 @@ fn divided(
         all.push(Some(Divided { moments, cells, size, lobes: vmf_mips::Lobes::of(&base, layer), layers }));
     }
     Ok(all)
-}
-
-impl Record {
-    /// Of a material whose `lobes` are filtered, its clusters, and the codes of its maps, its moments and its cells.
-    fn of(
-        material: &Material,
-        lobes: &Base,
-        [first, clusters]: [u32; 2],
-        [albedo, specular, normal, roughness, moments, cells]: [u32; 6],
-    ) -> Self {
-        let own = lobes.lobes();
-        Self {
-            places: [albedo, specular, normal, roughness],
-            tiling: material.maps.tiling,
-            rule: rule(material),
-            without: if matches!(material.model, Model::Vmf(_)) { 0.0 } else { 1.0 },
-            moments,
-            cells,
-            lobes: brdf_map::lobes(!own.is_empty(), Parameter::of(&material.model)),
-            weights: brdf_map::weights(own),
-            count: own.len() as u32,
-            upright: u32::from(lobes.upright()),
-            concentration: own.first().map_or(0.0, |lobe| lobe.kappa as f32),
-            facing: lobes.facing() as f32,
-            clusters: [first, clusters, 0, 0],
-        }
-    }
 }
 
 impl MapsUpload {

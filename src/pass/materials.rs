@@ -2,7 +2,6 @@
 
 use crate::config::Estimator;
 use crate::distribution::fitter::Budget;
-use crate::distribution::{Filter, LobeFit};
 use crate::error::{Error, Result};
 use crate::gpu::access::Access;
 use crate::gpu::buffer::Buffer;
@@ -12,8 +11,9 @@ use crate::gpu::recorder::{Recorder, States};
 use crate::gpu::retire::{Build, Handle, Retired};
 use crate::gpu::sampler::Samplers;
 use crate::gpu::upload::{BufferUpload, ImageUpload};
+use crate::kinds::Kinds;
 use crate::material::{MOST_KERNEL, Material};
-use crate::pass::fits::Packed;
+use crate::pass::fits::{self, Packed};
 use crate::pass::maps::{MapImages, MapsUpload, MomentWork, Reading, Uses};
 use crate::reflectance::ladder::{Ladder, own_square};
 use crate::reflectance::merl::{PHI_DIFF, THETA_DIFF, THETA_HALF};
@@ -47,20 +47,6 @@ struct Record {
     importance: [f32; 4],
     /// Where its cells begin among the texture bandwidths; tiling.
     texture_bandwidth: [f32; 4],
-}
-
-/// What kinds of materials there are: what passes are compiled for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Kinds {
-    /// Some whose lobes stay as they are, whatever the filter.
-    pub unfiltered: bool,
-    /// Some with a fit, and some without.
-    pub fitted: bool,
-    pub reflected: bool,
-    /// The most lobes that stand for one where light is looked up.
-    pub most_lobes: u32,
-    /// A bit for each `REFLECTANCE_*` of `glsl/bridge/materials.glsl` that there is.
-    pub models: u32,
 }
 
 /// What the shaders read.
@@ -229,35 +215,9 @@ fn bandwidths(
     Ok((lobes, BufferUpload::new(build, "texture bandwidth", usage, bytemuck::cast_slice(&cells))?))
 }
 
-/// The fit of a material that one stands for: not where maps, filters or the mesh's curvature change its lobes.
-fn fit(material: &Material, io: &Uploading<'_>, found: bool) -> Option<Arc<LobeFit>> {
-    let table = matches!(material.model, Model::Table(_) | Model::Turned(_));
-    let same = table || material.keeps_model() && !io.reading.widened && !found;
-    let build = || Arc::new(LobeFit::build(&material.model, io.budget));
-    (io.estimator.looks_up() && same).then(|| material.lobe_fit.clone().unwrap_or_else(build))
-}
-
-fn kinds(materials: &[Material], found: &[bool], packed: &Packed, filter: Filter) -> Kinds {
-    let layers = filter.lobe_layers() / if filter.has_slopes() { 2 } else { 1 };
-    let own = |(material, found): (&Material, &bool)| match &material.model {
-        _ if *found => layers,
-        Model::Vmf(vmf) => vmf.lobes().len() as u32,
-        _ => 1,
-    };
-    let fitted = |(_, first): &(_, &u32)| **first > 0;
-    let reflected = materials.iter().zip(found).zip(&packed.firsts).filter(|m| !fitted(m)).map(|(m, _)| own(m)).max();
-    Kinds {
-        unfiltered: found.contains(&false),
-        fitted: packed.most > 0,
-        reflected: reflected.is_some(),
-        most_lobes: reflected.unwrap_or_default().max(packed.most as u32),
-        models: materials.iter().fold(0, |bits, m| bits | 1 << number(&m.model)),
-    }
-}
-
 impl MaterialsUpload {
     pub fn new(build: &mut Build<'_>, materials: &[Material], io: &Uploading<'_>) -> Result<Self> {
-        let Uploading { reading, eps, estimator, .. } = io;
+        let Uploading { reading, eps, estimator, budget } = io;
         if materials.is_empty() || materials.len() > MAX_MATERIALS {
             return Err(Error::invalid("materials", format!("1 to {MAX_MATERIALS}"), materials.len()));
         }
@@ -279,10 +239,14 @@ impl MaterialsUpload {
         let places: Vec<_> = ladders.iter().zip(firsts).map(|(ladder, first)| ladder.record(first)).collect();
         let mut records = records(materials, &tables, &places, size[0]);
         let maps = MapsUpload::new(build, materials, reading)?;
-        let fits: Vec<_> = materials.iter().zip(&maps.found).map(|(m, found)| fit(m, io, *found)).collect();
+        let fits = match estimator.looks_up() {
+            true => fits::of(materials, &maps.found, reading.widened, *budget),
+            false => vec![None; materials.len()],
+        };
         let fitted = Packed::of(&fits);
         records.iter_mut().zip(&fitted.firsts).for_each(|(record, first)| record.kind[3] = *first);
-        let kinds = kinds(materials, &maps.found, &fitted, reading.filter);
+        let models = materials.iter().fold(0, |bits, m| bits | 1 << number(&m.model));
+        let kinds = Kinds::of(materials, &maps.found, &fitted, reading.filter, if estimator.looks_up() { models } else { 0 });
         let storage = vk::BufferUsageFlags::STORAGE_BUFFER;
         let fit_upload = estimator
             .looks_up()

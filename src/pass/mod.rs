@@ -16,6 +16,7 @@ pub mod gbuffer;
 pub(crate) mod kept;
 pub(crate) mod level;
 pub mod luminance;
+pub(crate) mod map_record;
 pub(crate) mod maps;
 pub mod materials;
 pub mod modules;

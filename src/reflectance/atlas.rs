@@ -43,7 +43,8 @@ pub fn lobe_bandwidths(materials: &[Material], eps: f64) -> Vec<f32> {
     texels
 }
 
-fn same_table(a: &Model, b: &Model) -> bool {
+/// Whether two models are one table.
+pub fn same_table(a: &Model, b: &Model) -> bool {
     match (a, b) {
         (Model::Table(a), Model::Table(b)) => Arc::ptr_eq(a, b),
         (Model::Turned(a), Model::Turned(b)) => Arc::ptr_eq(a, b),

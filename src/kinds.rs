@@ -1,0 +1,74 @@
+//! What kinds of materials there are, and the passes that are compiled for them.
+
+use crate::config::{Config, Estimator};
+use crate::distribution::Filter;
+use crate::error::Result;
+use crate::gpu::retire::Retired;
+use crate::material::Material;
+use crate::pass::fits::Packed;
+use crate::pass::{PassContext, base, shade};
+use crate::reflectance::Model;
+
+/// What passes are compiled for. Other materials of the same kinds need no other ones.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Kinds {
+    /// Some whose lobes stay as they are, whatever the filter.
+    pub unfiltered: bool,
+    /// Some with a fit, and some without.
+    pub fitted: bool,
+    pub reflected: bool,
+    /// The most lobes that stand for one where light is looked up.
+    pub most_lobes: u32,
+    /// Where light is looked up, a bit for each `REFLECTANCE_*` of `glsl/bridge/materials.glsl` that there is.
+    pub models: u32,
+}
+
+impl Kinds {
+    /// `found` says of which materials the filter finds the lobes.
+    pub fn of(materials: &[Material], found: &[bool], fits: &Packed, filter: Filter, models: u32) -> Self {
+        let layers = filter.lobe_layers() / if filter.has_slopes() { 2 } else { 1 };
+        let own = |(material, found): (&Material, &bool)| match &material.model {
+            _ if *found => layers,
+            Model::Vmf(vmf) => vmf.lobes().len() as u32,
+            _ => 1,
+        };
+        let without = materials.iter().zip(found).zip(&fits.firsts).filter(|(_, first)| **first == 0);
+        let reflected = without.map(|(material, _)| own(material)).max();
+        Self {
+            unfiltered: found.contains(&false),
+            fitted: fits.most > 0,
+            reflected: reflected.is_some(),
+            most_lobes: reflected.unwrap_or_default().max(fits.most as u32),
+            models,
+        }
+    }
+}
+
+/// The passes.
+pub(crate) struct OfKinds {
+    pub kinds: Kinds,
+    /// Where light is looked up.
+    pub base: Option<base::Base>,
+    /// Where directions are drawn.
+    pub shade: Option<shade::Shade>,
+}
+
+impl OfKinds {
+    pub fn new(p: &mut PassContext<'_, '_>, config: &Config, kinds: Kinds) -> Result<Self> {
+        let (looked_up, drawn) = (config.estimator.looks_up(), config.estimator != Estimator::Preconvolved);
+        Ok(Self {
+            kinds,
+            base: looked_up.then(|| base::Base::new(p, config, kinds)).transpose()?,
+            shade: drawn.then(|| shade::Shade::new(p, config, config.coarsest() > 0, kinds)).transpose()?,
+        })
+    }
+
+    pub fn retire(self, bag: &mut Retired) {
+        if let Some(pass) = self.base {
+            pass.retire(bag);
+        }
+        if let Some(pass) = self.shade {
+            pass.retire(bag);
+        }
+    }
+}
