@@ -32,13 +32,13 @@ void approximate(Material m, Lobes l, Approximation a, vec3 wo) {
         bool there = i < a.count;
         ReflectedLobe lobe = approximation_lobe(m, l, a, there ? i : 0u, wo);
         approximating_direction[i] = lobe.direction;
-        // As `prefiltered` has it; the map's bilinear look-ups are 3 factors of 2 sharper than the sharpest lobe.
+        // As `prefiltered` has it; the map's bilinear look-ups are 4 factors of 2 sharper than the sharpest lobe.
         vec4 scale = control.suns.scale;
         float steps = min(-log2(lobe.kappa * scale.x), scale.y);
         steps = EXACT != 0u ? max(steps, 0.0) : steps;
         bool map = steps < 0.0;
         float whole = floor(steps);
-        float kappa = exp2(map ? 0.0 : -whole - 1.0) / scale.x, sharper = kappa * (map ? 8.0 : 2.0);
+        float kappa = exp2(map ? 0.0 : -whole - 1.0) / scale.x, sharper = kappa * (map ? 16.0 : 2.0);
         float weight = map ? 1.0 - min(-steps * scale.z, 1.0) : steps - whole;
         vec3 amplitude = there ? lobe.weight : vec3(0.0);
         approximating_scale[i] = -0.5 * kappa;
@@ -55,14 +55,14 @@ vec3 approximation(Local f, vec3 wi) {
     [[unroll]] for (uint i = 0u; i < APPROXIMATING; ++i) {
         vec3 d = wi - approximating_direction[i];
         float broad = exp(approximating_scale[i] * dot(d, d)), sharp = broad * broad;
-        float fourth = sharp * sharp;
-        sharp = approximating_map[i] ? fourth * fourth : sharp;
+        float fourth = sharp * sharp, eighth = fourth * fourth;
+        sharp = approximating_map[i] ? eighth * eighth : sharp;
         if (EXACT != 0u) {
             vec3 centre = to_world(f, approximating_direction[i]), w = to_world(f, wi);
             float kappa = -2.0 * approximating_scale[i];
             bool even = approximating_even[i];
-            broad = texel_kernel(centre, kappa, even ? 1.0 : 2.0, w) / vmf_normalisation(kappa);
-            sharp = texel_kernel(centre, 2.0 * kappa, even ? 2.0 : 1.0, w) / vmf_normalisation(2.0 * kappa);
+            broad = texel_kernel(centre, kappa, even ? 2.0 : 4.0, w) / vmf_normalisation(kappa);
+            sharp = texel_kernel(centre, 2.0 * kappa, even ? 4.0 : 2.0, w) / vmf_normalisation(2.0 * kappa);
         }
         sum += approximating_broad[i] * broad + approximating_sharp[i] * sharp;
     }

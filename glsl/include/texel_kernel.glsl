@@ -21,7 +21,7 @@ float texel_kernel(vec3 centre, float kappa, float variance_in_texels, vec3 w) {
         vec2 place = (first + corner + 0.5) / size;
         vec4 mu = latlong_direction(vec2(place.x + frame.environment.x, place.y));
         // Without the variance that look-ups add.
-        float narrow = 1.0 / (1.0 / kappa - texel * texel * (1.0 / 12.0) * (1.0 + mu.w * mu.w));
+        float narrow = vmf_before(kappa, texel * texel * (1.0 / 12.0) * (1.0 + mu.w * mu.w));
         vec2 weight = mix(1.0 - along, along, corner);
         sum += weight.x * weight.y * vmf_density(mu.xyz, narrow, w);
     }

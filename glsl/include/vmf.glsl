@@ -70,4 +70,10 @@ float vmf_concentration(float spread) {
     return kappa;
 }
 
+// The concentration of what becomes a lobe of kappa by a blur of this variance, in squared radians along each of two axes: mean
+// cosines multiply.
+float vmf_before(float kappa, float variance) {
+    return vmf_concentration((vmf_spread(kappa) - variance) / (1.0 - variance));
+}
+
 #endif

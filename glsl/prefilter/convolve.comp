@@ -3,6 +3,7 @@
 // square texels (rings.glsl). Every texel within reach counts with its solid angle; weights are normalised, so that constant light
 // stays so. Twin: src/distribution/prefilter.rs.
 #include "rings.glsl"
+#include "vmf.glsl"
 
 layout(local_size_x = 64) in;
 // Whether the lobe is a clamped cosine.
@@ -35,9 +36,9 @@ void main() {
         return;
     }
     float turn = (float(x) + 0.5) / float(columns);
-    bool across = theta < 0.0 || theta > PI;
+    bool beyond = theta < 0.0 || theta > PI;
     theta = theta < 0.0 ? -theta : (theta > PI ? 2.0 * PI - theta : theta);
-    turn += across ? 0.5 : 0.0;
+    turn += beyond ? 0.5 : 0.0;
     vec2 at = cos_sin(theta);
 
     // What texels of the source and look-ups blur already, the lobe need not: half the variance along the meridian, half across.
@@ -46,7 +47,7 @@ void main() {
     float side = at.y * float(push.source_width) / float(ring_texels(nearest, push.source_width));
     float blurred = 0.5 * push.blurred * step_source * step_source * (1.0 + side * side)
         + step_target * step_target * (1.0 / 12.0) * (1.0 + at.y * at.y);
-    float kappa = 1.0 / (1.0 / push.kappa - blurred);
+    float kappa = vmf_before(push.kappa, blurred);
     float cos_reach = COSINE ? 0.0 : max(1.0 - REACH / kappa, -1.0);
     float reach = acos_full(cos_reach);
     int first_row = clamp(int((theta - reach) / step_source - 0.5), 0, last);

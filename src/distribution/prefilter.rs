@@ -2,8 +2,8 @@
 //! quadrature. Twin of `glsl/include/prefilter.glsl` and `glsl/prefilter`.
 //!
 //! The chain is two lat-long images with mips. Level 0 of the first is the environment itself without its suns
-//! ([`crate::distribution::suns`]); level l above is its convolution with a lobe whose standard deviation is one of
-//! that level's texels, so that the concentration falls by 4 a level. Level l of the second has twice the concentration of the first's
+//! ([`crate::distribution::suns`]); level l above is its convolution with a lobe whose variance is two of that
+//! level's squared texels, so that the concentration falls by 4 a level. Level l of the second has twice the concentration of the first's
 //! level l + 1, and half its texels: a look-up lies between a level of one and a level of the other, a factor of 2 apart. (One image with a factor of 4 is off by several times as much half-way between its levels.) Rows go on beyond the
 //! poles by a tenth of the image each: the rows there are those of the meridian across, and bilinear look-ups need no case of
 //! their own.
@@ -13,7 +13,7 @@ use glam::{DVec2, DVec3};
 use std::f64::consts::{PI, TAU};
 
 /// Square of a lobe's standard deviation in texels at the equator, in the first image; twice as much in the second.
-pub const VARIANCE_IN_TEXELS: f64 = 1.0;
+pub const VARIANCE_IN_TEXELS: f64 = 2.0;
 /// Columns of the coarsest level.
 pub const LEAST_WIDTH: u32 = 8;
 /// Columns of the finest: larger environments are averaged to it.
@@ -22,7 +22,7 @@ pub const MOST_WIDTH: u32 = 2048;
 pub const SOURCE_WIDTH: u32 = 64;
 /// Factors of 2 between the concentration of the finest lobe and that of the map itself, whose bilinear look-ups are lobes of a
 /// variance of a quarter of a texel.
-pub const STEPS_TO_MAP: f64 = 3.0;
+pub const STEPS_TO_MAP: f64 = 4.0;
 
 /// Shape of a chain.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

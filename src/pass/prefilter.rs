@@ -2,7 +2,7 @@
 //! looks them up; [`crate::distribution::prefilter`] and [`crate::distribution::suns`] are the f64 twins).
 //!
 //! Level 0 is the map without its suns. Of it come grids of nearly square texels, each a mean of the finer one's; every further
-//! level gathers the light under its lobe from the grid whose texels are half or seven tenths of its standard deviation, and none from
+//! level gathers the light under its lobe from the grid whose texels are half of its standard deviation or less, and none from
 //! another level, so that no error adds up. All of it lies in one buffer, which is copied into an image with mips at the end.
 
 use crate::distribution::prefilter::{Chain, SOURCE_WIDTH, STEPS_TO_MAP};
