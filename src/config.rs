@@ -190,6 +190,9 @@ pub struct Config {
     pub allocation: Allocation,
     /// Whether the curvature pass runs (an output of its own until something in the frame reads it).
     pub curvature: bool,
+    /// Whether the renderer's own G-buffer holds texture coordinates, their derivatives and tangents also where no material depends
+    /// on them, which takes longer; they are zero there without.
+    pub coordinates: bool,
     /// Where the G-buffer comes from.
     pub gbuffer: GBufferSource,
     /// Replacements of compiled modules.
@@ -225,6 +228,7 @@ impl Config {
             exact_lobes: false,
             allocation: Allocation::default(),
             curvature: false,
+            coordinates: false,
             gbuffer: GBufferSource::default(),
             modules: Modules::default(),
         }

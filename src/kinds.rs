@@ -21,6 +21,8 @@ pub(crate) struct Kinds {
     pub most_lobes: u32,
     /// Where light is looked up, a bit for each `REFLECTANCE_*` of `glsl/bridge/materials.glsl` that there is.
     pub models: u32,
+    /// Some that depend on texture coordinates or tangents.
+    pub coordinates: bool,
 }
 
 impl Kinds {
@@ -40,6 +42,7 @@ impl Kinds {
             reflected: reflected.is_some(),
             most_lobes: reflected.unwrap_or_default().max(fits.most as u32),
             models,
+            coordinates: materials.iter().any(Material::takes_coordinates),
         }
     }
 }

@@ -126,6 +126,12 @@ impl Material {
         table || albedo.is_none() && specular.is_none() && roughness.is_none()
     }
 
+    /// Whether what it looks like depends on texture coordinates or tangents.
+    pub(crate) fn takes_coordinates(&self) -> bool {
+        let turned = matches!(self.model, Model::Turned(_) | Model::Vmf(_));
+        turned || !self.maps.is_empty()
+    }
+
     /// Refuses parameters and maps that the model does not take.
     ///
     /// # Errors

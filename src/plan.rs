@@ -120,6 +120,7 @@ impl Plan {
         let image = |name, format, [w, h]: [u32; 2], usage| ImageDesc::new(name, format, [w, h, 1], usage);
         let sampled = vk::ImageUsageFlags::SAMPLED | vk::ImageUsageFlags::TRANSFER_SRC;
         let target = sampled | vk::ImageUsageFlags::COLOR_ATTACHMENT;
+        let cleared = target | vk::ImageUsageFlags::TRANSFER_DST;
         let storage = sampled | vk::ImageUsageFlags::STORAGE;
         let levels = Levels::of(config, shading);
         // Above the coarsest level, so that all of them are below.
@@ -132,8 +133,8 @@ impl Plan {
                 [
                     image("surface", vk::Format::R32G32B32A32_SFLOAT, shading, target),
                     image("ids", vk::Format::R32_UINT, shading, target),
-                    image("coordinate", vk::Format::R32G32B32A32_SFLOAT, shading, target),
-                    image("derivative", vk::Format::R32G32B32A32_SFLOAT, shading, target),
+                    image("coordinate", vk::Format::R32G32B32A32_SFLOAT, shading, cleared),
+                    image("derivative", vk::Format::R32G32B32A32_SFLOAT, shading, cleared),
                     image("depth", vk::Format::D32_SFLOAT, shading, vk::ImageUsageFlags::DEPTH_STENCIL_ATTACHMENT),
                 ]
             }),

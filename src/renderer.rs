@@ -150,6 +150,8 @@ impl Renderer {
         if let Some(timings) = self.timer.begin_frame(&self.cx, cmd, inputs.slot)? {
             self.timings = Some(timings);
         }
+        let coordinates = self.config.coordinates || of_kinds.kinds.coordinates;
+        let clear = self.targets.gbuffer.as_mut().is_some_and(|images| images.expect(coordinates));
         let (records, counts) = light::records(inputs.lights);
         let [exact, area] = counts;
         let uniform = inputs.uniform(&self.config, &self.targets.plan, counts);
@@ -163,7 +165,8 @@ impl Renderer {
         // 1  Surfaces: our own G-buffer from draws, or the host's behind its bridge.
         let gbuffer = match (inputs.gbuffer, &passes.gbuffer, &targets.gbuffer) {
             (GBufferInput::Draws(draws), Some(pass), Some(images)) => {
-                pass.record(rec, &gbuffer::Io { draws, clip_from_world: inputs.view.clip_from_world(), images });
+                let clip_from_world = inputs.view.clip_from_world();
+                pass.record(rec, &gbuffer::Io { draws, clip_from_world, coordinates, clear, images });
                 pass.bridge(rec, images, samplers)
             }
             (GBufferInput::Host { set, images }, None, None) => {

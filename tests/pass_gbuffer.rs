@@ -3,14 +3,14 @@
 mod common;
 
 use common::{assert_clean, headless};
-use glam::{DVec2, DVec3, DVec4, EulerRot, Mat4, Quat, dvec2, dvec3, vec3};
+use glam::{DVec2, DVec3, DVec4, EulerRot, Mat4, Quat, Vec3, dvec2, dvec3, vec3};
 use half::f16;
-use passband::Config;
 use passband::offline::builtin;
 use passband::offline::mesh::Mesh;
 use passband::offline::session::Session;
 use passband::offline::world::{Camera, Material, Object, World};
 use passband::reflectance::frame;
+use passband::{Config, Maps};
 use std::collections::HashSet;
 use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
@@ -43,7 +43,7 @@ fn camera(position: DVec3) -> Camera {
 
 /// The covered samples of one validated frame of `objects` (mesh, transform, material).
 fn render(camera: Camera, objects: Vec<(Mesh, Mat4, usize)>) -> Vec<Sample> {
-    let config = Config { directions: 2, curvature: true, ..Config::new(EXTENT) };
+    let config = Config { directions: 2, curvature: true, coordinates: true, ..Config::new(EXTENT) };
     let material = |i: i32| Material { name: format!("{i}"), model: common::rig::grey(), maps: Default::default() };
     let world = World {
         name: "test".into(),
@@ -304,4 +304,60 @@ fn tangents_follow_growing_u_under_every_transform() {
     }
     let plain = render(camera(dvec3(0.4, 0.5, 3.0)), vec![(builtin::mesh("sphere", 64).unwrap(), Mat4::IDENTITY, 0)]);
     assert!(plain.iter().all(|s| s.tangent.is_none()));
+}
+
+/// A sphere seen from outside, mirrored, and from inside; each looks like one that lacks a triangle at its far end, which makes it
+/// an open sheet whose back faces are drawn.
+#[test]
+fn back_faces_of_solids_are_not_missed() {
+    let solid = builtin::mesh("torus-knot", 128).unwrap();
+    let camera = camera(dvec3(0.5, 0.6, 3.0));
+    for transform in [Mat4::from_rotation_x(0.4), Mat4::from_scale(vec3(-1.0, 0.7, 0.9)), Mat4::from_scale(Vec3::splat(8.0))] {
+        let seen = |mesh: &Mesh| render(camera, vec![(mesh.clone(), transform, 0)]);
+        // The corner that is furthest away is behind others.
+        let far = |triangle: &[u32; 3]| {
+            let at = transform.transform_point3(Vec3::from(solid.positions[triangle[0] as usize])).as_dvec3();
+            at.distance(camera.position)
+        };
+        let triangles = solid.indices.as_chunks::<3>().0;
+        let last = (0..triangles.len()).max_by(|i, j| far(&triangles[*i]).total_cmp(&far(&triangles[*j]))).unwrap();
+        let mut open = solid.clone();
+        open.indices.drain(3 * last..3 * last + 3);
+        assert!(solid.is_closed() && !open.is_closed());
+        let (culled, drawn) = (seen(&solid), seen(&open));
+        assert!(culled.len() > 500, "{}", culled.len());
+        let pixels = |samples: &[Sample]| samples.iter().map(|s| s.pixel).collect::<HashSet<_>>();
+        assert!(pixels(&culled).symmetric_difference(&pixels(&drawn)).count() <= 1);
+        let same = culled.iter().zip(&drawn).filter(|(a, b)| (a.depth - b.depth).abs() < 1e-4 * a.depth).count();
+        assert!(same + 2 >= culled.len().min(drawn.len()), "{same} of {}", culled.len());
+    }
+}
+
+/// Texture coordinates are zero where nothing depends on them, unless they are asked for.
+#[test]
+fn coordinates_are_there_where_they_are_read() {
+    let white = Arc::new(passband::texture::Texture::colour8([1, 1], &[[255; 3]]).unwrap());
+    let mapped = Maps { albedo: Some(white), ..Maps::default() };
+    for (maps, coordinates, there) in [(Maps::default(), false, false), (Maps::default(), true, true), (mapped, false, true)] {
+        let config = Config { directions: 2, coordinates, ..Config::new(EXTENT) };
+        let object = Object { mesh: Arc::new(builtin::mesh("sphere", 64).unwrap()), transform: Mat4::IDENTITY, material: 0 };
+        let world = World {
+            name: "test".into(),
+            camera: camera(dvec3(0.5, 0.6, 3.0)),
+            size: None,
+            environment: None,
+            lights: Vec::new(),
+            objects: vec![object],
+            materials: vec![Material { name: "grey".into(), model: common::rig::grey(), maps }],
+        };
+        let mut session = Session::new(headless(&config), &world, &config).unwrap();
+        for _ in 0..2 {
+            session.frame([0, 0]).unwrap();
+            for name in ["coordinate", "derivative"] {
+                let texels: Vec<[f32; 4]> = bytemuck::pod_collect_to_vec(&session.image(name).unwrap().0);
+                assert_eq!(texels.iter().any(|texel| *texel != [0.0; 4]), there, "{name}");
+            }
+        }
+        assert_clean(&session.messages());
+    }
 }

@@ -268,9 +268,10 @@ fn bound_by_rust() -> Vec<ModuleInterface> {
         let name = format!("{}.comp", interface.name);
         ModuleInterface { name, local_size: interface.local_size, push_constant_bytes: interface.push_bytes, bindings }
     });
-    let raster = [("gbuffer.vert", 128), ("gbuffer.frag", 128), ("texture_space.vert", 112), ("texture_space.frag", 112)];
+    let passes = [("gbuffer.plain", 128), ("gbuffer.coordinates", 128), ("texture_space", 112)];
+    let raster = passes.into_iter().flat_map(|(name, bytes)| ["vert", "frag"].map(|stage| (format!("{name}.{stage}"), bytes)));
     let raster = raster.map(|(name, push_constant_bytes)| ModuleInterface {
-        name: name.into(),
+        name,
         local_size: [0; 3],
         push_constant_bytes,
         bindings: Vec::new(),

@@ -57,10 +57,7 @@ impl RasterPipeline {
             .vertex_attribute_descriptions(&attributes);
         let assembly = vk::PipelineInputAssemblyStateCreateInfo::default().topology(vk::PrimitiveTopology::TRIANGLE_LIST);
         let viewport = vk::PipelineViewportStateCreateInfo::default().viewport_count(1).scissor_count(1);
-        let raster = vk::PipelineRasterizationStateCreateInfo::default()
-            .polygon_mode(vk::PolygonMode::FILL)
-            .cull_mode(vk::CullModeFlags::NONE)
-            .line_width(1.0);
+        let raster = vk::PipelineRasterizationStateCreateInfo::default().polygon_mode(vk::PolygonMode::FILL).line_width(1.0);
         let samples = vk::PipelineMultisampleStateCreateInfo::default().rasterization_samples(vk::SampleCountFlags::TYPE_1);
         let test = vk::PipelineDepthStencilStateCreateInfo::default()
             .depth_test_enable(depth != vk::Format::UNDEFINED)
@@ -73,6 +70,8 @@ impl RasterPipeline {
             vk::DynamicState::VIEWPORT,
             vk::DynamicState::SCISSOR,
             vk::DynamicState::VERTEX_INPUT_BINDING_STRIDE,
+            vk::DynamicState::CULL_MODE,
+            vk::DynamicState::FRONT_FACE,
         ]);
         let mut rendering =
             vk::PipelineRenderingCreateInfo::default().color_attachment_formats(colors).depth_attachment_format(depth);
@@ -101,7 +100,8 @@ impl RasterPipeline {
         Ok(Self { pipeline, layout })
     }
 
-    /// Opens a rendering over all of `extent` with this pipeline; the attachments are ready. [`Self::end`] closes it.
+    /// Opens a rendering over all of `extent` with this pipeline, for triangles of either side; the attachments are ready.
+    /// [`Self::end`] closes it.
     pub fn begin(
         &self,
         rec: &Recorder<'_>,
@@ -122,6 +122,8 @@ impl RasterPipeline {
             device.cmd_bind_pipeline(rec.cmd, vk::PipelineBindPoint::GRAPHICS, self.pipeline);
             device.cmd_set_viewport(rec.cmd, 0, &[viewport]);
             device.cmd_set_scissor(rec.cmd, 0, &[area]);
+            device.cmd_set_cull_mode(rec.cmd, vk::CullModeFlags::NONE);
+            device.cmd_set_front_face(rec.cmd, vk::FrontFace::COUNTER_CLOCKWISE);
         }
     }
 

@@ -125,6 +125,11 @@ impl Aov {
         self == Self::Curvature
     }
 
+    /// Whether it is of texture coordinates.
+    pub fn needs_coordinates(self) -> bool {
+        matches!(self, Self::Uv | Self::Footprint)
+    }
+
     /// The layer's channels after a frame of `config`.
     ///
     /// # Errors

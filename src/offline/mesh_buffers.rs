@@ -11,6 +11,7 @@ use crate::offline::headless::Headless;
 use crate::offline::mesh::Mesh;
 use crate::offline::session::closed;
 use ash::vk;
+use glam::{Mat4, Vec3};
 use std::sync::Arc;
 
 pub(super) struct MeshBuffers {
@@ -22,6 +23,8 @@ pub(super) struct MeshBuffers {
     tangents: Option<Buffer>,
     indices: Buffer,
     count: u32,
+    /// Of a closed mesh: its bounds, outside of which no back face is seen.
+    bounds: Option<[Vec3; 2]>,
 }
 
 impl MeshBuffers {
@@ -49,15 +52,18 @@ impl MeshBuffers {
             let [positions, normals, coordinates, indices] = uploads.map(|u| u.record(&mut rec, &mut bag));
             let tangents = tangents.map(|u| u.record(&mut rec, &mut bag));
             let count = mesh.indices.len() as u32;
+            let bounds = mesh.is_closed().then(|| mesh.bounds().map(Vec3::from));
             let _mesh = Arc::clone(mesh);
-            uploaded = Some(Self { _mesh, positions, normals, coordinates, tangents, indices, count });
+            uploaded = Some(Self { _mesh, positions, normals, coordinates, tangents, indices, count, bounds });
             Ok(bag)
         })?;
         uploaded.ok_or_else(closed)
     }
 
-    /// Of object `object`, placed by a column-major matrix.
-    pub fn draw(&self, world_from_object: [f32; 16], material: u32, object: u32) -> Draw {
+    /// Of object `object`, seen from `eye` in world space.
+    pub fn draw(&self, world_from_object: Mat4, eye: Vec3, material: u32, object: u32) -> Draw {
+        let eye = world_from_object.inverse().transform_point3(eye);
+        let inside = |[least, greatest]: [Vec3; 2]| eye.cmpge(least).all() && eye.cmple(greatest).all();
         Draw {
             positions: (self.positions.handle, 0),
             normals: (self.normals.handle, 0),
@@ -65,7 +71,8 @@ impl MeshBuffers {
             tangents: self.tangents.as_ref().map(|b| (b.handle, 0)),
             indices: (self.indices.handle, 0),
             index_count: self.count,
-            world_from_object,
+            closed: self.bounds.is_some_and(|bounds| !inside(bounds)),
+            world_from_object: world_from_object.to_cols_array(),
             material,
             object,
         }

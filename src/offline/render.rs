@@ -73,6 +73,7 @@ impl Settings {
         let base = Config {
             frames_in_flight: 1,
             curvature: self.config.curvature || self.aovs.iter().any(|a| a.needs_curvature()),
+            coordinates: self.config.coordinates || self.aovs.iter().any(|a| a.needs_coordinates()),
             ..self.config.clone()
         };
         let Some(directions) = self.reference else { return base };

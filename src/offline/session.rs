@@ -178,8 +178,8 @@ impl Session {
                 self.meshes.insert(key, buffers);
             }
             let Some(mesh) = self.meshes.get(&key) else { continue };
-            let world_from_object = object.transform.to_cols_array();
-            self.shown.draws.push(mesh.draw(world_from_object, object.material as u32, number));
+            let eye = world.camera.position.as_vec3();
+            self.shown.draws.push(mesh.draw(object.transform, eye, object.material as u32, number));
         }
         Ok(())
     }

@@ -23,6 +23,8 @@ pub const BRIDGE: [vk::DescriptorType; 4] = [vk::DescriptorType::COMBINED_IMAGE_
 
 const COLORS: [vk::Format; 4] =
     [vk::Format::R32G32B32A32_SFLOAT, vk::Format::R32_UINT, vk::Format::R32G32B32A32_SFLOAT, vk::Format::R32G32B32A32_SFLOAT];
+/// How many of them there are without texture coordinates.
+const PLAIN_COLORS: usize = 2;
 const DEPTH: vk::Format = vk::Format::D32_SFLOAT;
 /// Contents of the buffer that stands in for missing tangents.
 pub(crate) const NO_TANGENT: [u8; 16] = [0; 16];
@@ -64,6 +66,9 @@ pub struct Draw {
     pub indices: (vk::Buffer, u64),
     /// Indices to draw.
     pub index_count: u32,
+    /// Whether the mesh is the border of a solid that is seen from outside, triangles counter-clockwise from there: faces that show
+    /// their back are left out then, as others hide them, which saves up to half of the pass.
+    pub closed: bool,
     /// World from object, column-major, invertible.
     pub world_from_object: [f32; 16],
     /// Index of the material among those uploaded, below 65535.
@@ -81,6 +86,18 @@ impl Draw {
     pub(crate) fn normal_from_object(&self) -> [[f32; 4]; 3] {
         let normal = Mat3::from_mat4(self.world_from_object()).inverse().transpose();
         normal.to_cols_array_2d().map(|[x, y, z]| [x, y, z, 0.0])
+    }
+
+    /// Leaves back faces out where none is seen. A mirror image winds the other way.
+    fn cull(&self, rec: &Recorder<'_>) {
+        let mirrored = self.world_from_object().determinant() < 0.0;
+        let front = if mirrored { vk::FrontFace::CLOCKWISE } else { vk::FrontFace::COUNTER_CLOCKWISE };
+        let mode = if self.closed { vk::CullModeFlags::BACK } else { vk::CullModeFlags::NONE };
+        // SAFETY: the command buffer is recording.
+        unsafe {
+            rec.cx.device.cmd_set_cull_mode(rec.cmd, mode);
+            rec.cx.device.cmd_set_front_face(rec.cmd, front);
+        }
     }
 
     /// Draws it with the pipeline that is bound, which takes `push`. The rendering is open.
@@ -111,6 +128,8 @@ pub(crate) struct GBufferImages {
     /// d(uv)/dx, d(uv)/dy in texture units a sample.
     derivative: Image,
     depth: Image,
+    /// Whether `coordinate` and `derivative` are zero.
+    blank: bool,
 }
 
 impl GBufferImages {
@@ -121,7 +140,14 @@ impl GBufferImages {
             coordinate: Image::new(build, coordinate)?,
             derivative: Image::new(build, derivative)?,
             depth: Image::new(build, depth)?,
+            blank: false,
         })
+    }
+
+    /// That a frame with or without coordinates follows: whether they have to be made zero before it.
+    pub fn expect(&mut self, coordinates: bool) -> bool {
+        let blank = std::mem::replace(&mut self.blank, !coordinates);
+        !coordinates && !blank
     }
 
     pub fn colors(&self) -> [&Image; 4] {
@@ -136,13 +162,17 @@ impl GBufferImages {
 pub(crate) struct Io<'a> {
     pub draws: &'a [Draw],
     pub clip_from_world: Mat4,
+    /// Whether there are texture coordinates and tangents to write, and whether their images have to be made zero.
+    pub coordinates: bool,
+    pub clear: bool,
     /// Out.
     pub images: &'a GBufferImages,
 }
 
-/// The pipeline, and set 0 for the passes that read the result.
+/// The pipelines, and set 0 for the passes that read the result.
 pub(crate) struct GBuffer {
-    pipeline: RasterPipeline,
+    /// Without texture coordinates and tangents, and with them.
+    pipelines: [RasterPipeline; 2],
     no_tangent: Buffer,
     pub layout: vk::DescriptorSetLayout,
     sets: Sets,
@@ -150,17 +180,34 @@ pub(crate) struct GBuffer {
 
 impl GBuffer {
     pub fn new(p: &mut PassContext<'_, '_>) -> Result<Self> {
-        let pipeline = RasterPipeline::new(p.build, p.modules, NAME, size_of::<Push>() as u32, &STREAMS, &COLORS, DEPTH)?;
+        let mut pipeline = |variant: &str, streams: &[vk::Format], colors: &[vk::Format]| {
+            RasterPipeline::new(
+                p.build,
+                p.modules,
+                &format!("{NAME}.{variant}"),
+                size_of::<Push>() as u32,
+                streams,
+                colors,
+                DEPTH,
+            )
+        };
+        let pipelines = [pipeline("plain", &STREAMS[..2], &COLORS[..PLAIN_COLORS])?, pipeline("coordinates", &STREAMS, &COLORS)?];
         let no_tangent = no_tangent(p.build)?;
         let layout = set_layout(p.build, vk::ShaderStageFlags::COMPUTE, &BRIDGE)?;
         let sets = Sets::new(p.build, layout, &BRIDGE, p.slots)?;
-        Ok(Self { pipeline, no_tangent, layout, sets })
+        Ok(Self { pipelines, no_tangent, layout, sets })
     }
 
     pub fn record(&self, rec: &mut Recorder<'_>, io: &Io<'_>) {
         rec.begin(NAME);
-        let colors = io.images.colors();
-        colors.into_iter().for_each(|image| rec.overwrite(image, Access::COLOR_WRITE));
+        let all = io.images.colors();
+        let (colors, without) = all.split_at(if io.coordinates { all.len() } else { PLAIN_COLORS });
+        if io.clear {
+            without.iter().for_each(|image| rec.overwrite(image, Access::TRANSFER_WRITE));
+            rec.flush();
+            without.iter().for_each(|image| clear(rec, image));
+        }
+        colors.iter().for_each(|image| rec.overwrite(image, Access::COLOR_WRITE));
         rec.overwrite(&io.images.depth, Access::DEPTH_WRITE);
         rec.flush();
         let attachment = |image: &Image, layout, depth: f32| {
@@ -180,18 +227,20 @@ impl GBuffer {
                 })
                 .clear_value(clear)
         };
-        let attachments = colors.map(|image| attachment(image, Access::COLOR_WRITE.layout, 0.0));
+        let attachments: Vec<_> = colors.iter().map(|image| attachment(image, Access::COLOR_WRITE.layout, 0.0)).collect();
         let depth = attachment(&io.images.depth, Access::DEPTH_WRITE.layout, 1.0);
-        self.pipeline.begin(rec, io.images.surface.extent(), &attachments, Some(&depth));
+        let pipeline = &self.pipelines[usize::from(io.coordinates)];
+        pipeline.begin(rec, io.images.surface.extent(), &attachments, Some(&depth));
         for draw in io.draws {
             let push = Push {
                 clip_from_object: (io.clip_from_world * draw.world_from_object()).to_cols_array_2d(),
                 normal_from_object: draw.normal_from_object(),
                 id: [(draw.object << 16 | draw.material) + 1, 0, 0, 0],
             };
-            draw.record(rec, self.pipeline.layout, &push, &self.no_tangent);
+            draw.cull(rec);
+            draw.record(rec, pipeline.layout, &push, &self.no_tangent);
         }
-        self.pipeline.end(rec);
+        pipeline.end(rec);
         rec.end();
     }
 
@@ -205,11 +254,20 @@ impl GBuffer {
     }
 
     pub fn retire(self, bag: &mut Retired) {
-        self.pipeline.retire(bag);
+        self.pipelines.into_iter().for_each(|pipeline| pipeline.retire(bag));
         self.no_tangent.retire(bag);
         self.sets.retire(bag);
         bag.push(Handle::SetLayout(self.layout));
     }
+}
+
+/// Makes an image that is ready to be written by transfers zero.
+fn clear(rec: &Recorder<'_>, image: &Image) {
+    let range =
+        vk::ImageSubresourceRange { aspect_mask: image.desc.aspect(), level_count: 1, layer_count: 1, ..Default::default() };
+    let (zero, layout) = (vk::ClearColorValue { float32: [0.0; 4] }, Access::TRANSFER_WRITE.layout);
+    // SAFETY: the command buffer is recording; the image is in that layout.
+    unsafe { rec.cx.device.cmd_clear_color_image(rec.cmd, image.handle, layout, &zero, &[range]) };
 }
 
 /// Refuses draws whose material was not uploaded: the shaders would read past the last one.

@@ -16,8 +16,10 @@ macro_rules! modules {
 }
 
 modules! {
-    "gbuffer.vert",
-    "gbuffer.frag",
+    "gbuffer.plain.vert",
+    "gbuffer.plain.frag",
+    "gbuffer.coordinates.vert",
+    "gbuffer.coordinates.frag",
     "texture_space.vert",
     "texture_space.frag",
     "brdf_map.comp",

@@ -154,7 +154,8 @@ impl Rig {
         self.meshes.push(buffers);
         let index_count = mesh.indices.len() as u32;
         let world_from_object = glam::Mat4::IDENTITY.to_cols_array();
-        Draw { positions, normals, coordinates, tangents: None, indices, index_count, world_from_object, material: 0, object }
+        let (tangents, closed) = (None, false);
+        Draw { positions, normals, coordinates, tangents, indices, index_count, closed, world_from_object, material: 0, object }
     }
 
     /// One frame of `draws` in slot 0: linear radiance and coverage.

@@ -6,6 +6,7 @@ use std::collections::HashMap;
 use std::path::Path;
 
 mod atlas;
+mod closed;
 mod displace;
 mod gzip;
 mod obj;
