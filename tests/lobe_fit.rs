@@ -48,7 +48,7 @@ fn viewer(degrees: f64) -> DVec3 {
 #[test]
 fn errors_are_small() {
     // Mean over nodes, at 60 degrees, and lobes.
-    let bounds = [(0.075, 0.042, 15), (0.048, 0.036, 8), (0.0115, 0.014, 4), (0.031, 0.033, 8), (0.105, 0.04, 15)];
+    let bounds = [(0.075, 0.042, 15), (0.048, 0.036, 8), (0.0115, 0.014, 4), (0.031, 0.04, 8), (0.105, 0.04, 15)];
     for ((name, f, fit), (mean, at_60, lobes)) in CASES.iter().zip(bounds) {
         let found = fit.missed(f.as_ref(), 0.5);
         assert!(fit.mean_error() < mean && found < at_60, "{name}: {} {found}", fit.mean_error());
@@ -56,6 +56,21 @@ fn errors_are_small() {
         let valid =
             |n: &FitNode| n.lobes.iter().all(|l| l.amplitude.min_element() >= 0.0 && (-1.0..=17.0).contains(&l.log2_kappa));
         assert!(fit.nodes().iter().all(valid), "{name}");
+    }
+}
+
+/// Chains are long for grazing views alone.
+#[test]
+fn few_lobes_are_used_where_few_are_needed() {
+    for (name, _, fit) in CASES.iter() {
+        let used = |n: &FitNode| n.lobes.iter().filter(|l| l.amplitude != DVec3::ZERO).count();
+        let counts: Vec<usize> = fit.nodes().iter().map(used).collect();
+        println!("{name}: {counts:?}");
+        let most = counts.iter().copied().max().unwrap();
+        assert!(counts[0] > 0 && (2 * counts[0] <= most || most <= 4), "{name}: {counts:?}");
+        // What light is looked up under is all that there is between two nodes.
+        let (_, spaces) = counts.split_first().unwrap();
+        assert!(counts.iter().zip(spaces).all(|(a, b)| a.abs_diff(*b) <= 4), "{name}: {counts:?}");
     }
 }
 

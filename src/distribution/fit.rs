@@ -31,7 +31,7 @@ pub struct FitLobe {
 /// The fit at one view angle.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct FitNode {
-    /// As many at every node, each the same one throughout.
+    /// As many at every node, each the same one throughout; without amplitude where it is not needed.
     pub lobes: Vec<FitLobe>,
     /// Reflectance of the cosine part.
     pub diffuse: DVec3,

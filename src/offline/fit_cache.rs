@@ -9,7 +9,7 @@ use glam::DVec3;
 use std::path::{Path, PathBuf};
 
 /// Changes with whatever changes the result for one model and budget.
-const VERSION: &[u8] = b"passband lobe fit 1";
+const VERSION: &[u8] = b"passband lobe fit 2";
 /// Numbers of a lobe, and of a node beside its lobes.
 const NUMBERS: [usize; 2] = [5, 4];
 

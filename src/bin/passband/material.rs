@@ -153,7 +153,10 @@ fn report_fit(subject: &Subject) -> Result<LobeFit> {
     let mut table = Table::new();
     let degrees = ANGLES.map(|degrees| format!("{degrees}"));
     table.load_style(presets::NOTHING).set_header(["degrees".into()].into_iter().chain(degrees).chain(["mean".into()]));
-    let errors = ANGLES.map(|degrees| format!("{:.4}", fit.at(degrees.to_radians().cos()).error));
+    let seen = ANGLES.map(|degrees| fit.at(degrees.to_radians().cos()));
+    let used = seen.each_ref().map(|node| node.lobes.iter().filter(|l| l.amplitude != DVec3::ZERO).count().to_string());
+    table.add_row(["lobes".into()].into_iter().chain(used));
+    let errors = seen.map(|node| format!("{:.4}", node.error));
     let mean = format!("{:.4}", fit.mean_error());
     table.add_row(["missed share of the light".into()].into_iter().chain(errors).chain([mean]));
     crate::print(table)?;

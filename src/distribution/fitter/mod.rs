@@ -9,6 +9,7 @@ mod chain;
 mod grid;
 mod nnls;
 mod node;
+mod thin;
 
 use crate::distribution::fit::{FitNode, LobeFit, MOST_LOBES, NODES};
 use crate::reflectance::analysis::highlight;
@@ -74,6 +75,7 @@ impl LobeFit {
         let enough = tried.into_iter().find(|t| t.1 <= budget.error.max(AS_GOOD * least));
         // Nothing where nothing is a number.
         let nodes = enough.map_or_else(|| vec![FitNode::default(); NODES], |(first, _)| samples.fit(&first, 1));
+        let nodes = thin::thinned(&samples, nodes, budget.error);
         let fit = Self::of(nodes).without_idle_lobes();
         if reflectance.isotropic() {
             return fit;

@@ -35,6 +35,13 @@ pub struct Problem<'a> {
     weights: [Vec<f64>; 3],
 }
 
+/// Sums over a grid of the weighted products of values with each other, with the reflectance, and of its with itself.
+pub struct Products {
+    pub gram: DMatrix<f64>,
+    pub b: DVector<f64>,
+    pub squares: f64,
+}
+
 /// The lobes' values, and their derivatives by tilt and by log2 of the concentration.
 struct Columns {
     values: DMatrix<f64>,
@@ -119,21 +126,40 @@ impl<'a> Problem<'a> {
         columns
     }
 
+    /// Of the weighted values of lobes and of the reflectance, in one channel.
+    fn products(&self, values: &DMatrix<f64>, channel: usize) -> Products {
+        let (n, weights) = (values.ncols(), &self.weights[channel]);
+        let mut with_target = DMatrix::zeros(values.nrows(), n + 1);
+        for (to, from) in with_target.column_iter_mut().zip(values.column_iter()) {
+            scale(to, from, weights);
+        }
+        let targets = self.grid.values.iter().zip(weights).map(|(f, w)| f[channel] * w);
+        with_target.column_mut(n).iter_mut().zip(targets).for_each(|(to, from)| *to = from);
+        let all = with_target.transpose() * &with_target;
+        let gram = all.view((0, 0), (n, n)).into_owned();
+        Products { gram, b: all.view((0, n), (n, 1)).column(0).into_owned(), squares: all[(n, n)] }
+    }
+
+    /// The products of `lobes` and of the cosine part, which is the last, by channel.
+    pub fn products_of(&self, lobes: &[FitLobe]) -> [Products; 3] {
+        let mut values = DMatrix::zeros(self.grid.directions.len(), lobes.len() + 1);
+        for (mut column, lobe) in values.column_iter_mut().zip(lobes) {
+            let (kappa, centre) = (lobe.log2_kappa.exp2(), lobe.direction());
+            let peak = normalisation(kappa);
+            let density = |w: &DVec3| peak * (kappa * (centre.dot(*w) - 1.0)).exp();
+            column.iter_mut().zip(&self.grid.directions).for_each(|(v, w)| *v = density(w));
+        }
+        let mut cosine = values.column_mut(lobes.len());
+        cosine.iter_mut().zip(&self.grid.directions).for_each(|(v, w)| *v = w.z.max(0.0) / PI);
+        std::array::from_fn(|channel| self.products(&values, channel))
+    }
+
     /// The best amplitudes of `chains`, searched from those of `start`.
     fn amplitudes(&self, chains: Vec<Chain>, values: &DMatrix<f64>, start: Option<&State>, before: Option<&State>) -> State {
         let n = values.ncols();
         let mut cost = before.map_or(0.0, |before| pull(&chains, before).map(|p| p * p).sum::<f64>() * PULL);
         let amplitudes = std::array::from_fn(|c| {
-            let mut with_target = DMatrix::zeros(values.nrows(), n + 1);
-            for (to, from) in with_target.column_iter_mut().zip(values.column_iter()) {
-                scale(to, from, &self.weights[c]);
-            }
-            let targets = self.grid.values.iter().zip(&self.weights[c]).map(|(f, w)| f[c] * w);
-            with_target.column_mut(n).iter_mut().zip(targets).for_each(|(to, from)| *to = from);
-            let products = with_target.transpose() * &with_target;
-            let mut gram = products.view((0, 0), (n, n)).into_owned();
-            let mut b = products.view((0, n), (n, 1)).column(0).into_owned();
-            let squares = products[(n, n)];
+            let Products { mut gram, mut b, squares } = self.products(values, c);
             if squares <= 0.0 {
                 return DVector::zeros(n);
             }
