@@ -13,6 +13,8 @@ layout(set = 2, binding = 5) uniform sampler2D base;
 // Whether `radiance` is what `base` lacks, or a factor on it.
 layout(constant_id = 0) const uint RESIDUAL = 0u;
 layout(constant_id = 1) const uint RATIO = 0u;
+// Samples a side of an output pixel: a constant, as quotients by anything else take as long as all of the rest.
+layout(constant_id = 2) const int SIDE = 1;
 
 layout(push_constant) uniform Push {
     float offset; // on both sides of a factor, in radiance
@@ -29,14 +31,13 @@ vec3 radiance_at(ivec2 p) {
 
 void main() {
     ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
-    int side = int(frame.extent.z);
-    if (any(greaterThanEqual(pixel, ivec2(frame.extent.xy) / side))) {
+    if (any(greaterThanEqual(pixel, imageSize(resolved)))) {
         return;
     }
     vec4 sum = vec4(0.0);
     uint missing = 0u; // bit k: sample k shows the environment
-    for (int k = 0; k < side * side; ++k) {
-        ivec2 p = pixel * side + ivec2(k % side, k / side);
+    for (int k = 0; k < SIDE * SIDE; ++k) {
+        ivec2 p = pixel * SIDE + ivec2(k % SIDE, k / SIDE);
         bool covered = gbuffer_covered(p);
         // What no surface is at may be undefined.
         sum += covered ? vec4(radiance_at(p), 1.0) : vec4(0.0);
@@ -46,7 +47,7 @@ void main() {
     while (missing != 0u) {
         int k = findLSB(missing);
         missing &= missing - 1u;
-        sum.rgb += environment_lookup(normalize(frame_ray(pixel * side + ivec2(k % side, k / side)))).rgb;
+        sum.rgb += environment_lookup(normalize(frame_ray(pixel * SIDE + ivec2(k % SIDE, k / SIDE)))).rgb;
     }
-    imageStore(resolved, pixel, sum / float(side * side));
+    imageStore(resolved, pixel, sum / float(SIDE * SIDE));
 }

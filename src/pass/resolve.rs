@@ -49,8 +49,9 @@ pub(crate) struct Resolve(ComputePipeline);
 
 impl Resolve {
     pub fn new(p: &mut PassContext<'_, '_>, config: &Config) -> Result<Self> {
-        let residual = [config.estimator.has_residual(), config.estimator == Estimator::Residual].map(u32::from);
-        Ok(Self(ComputePipeline::new(p.build, p.modules, &INTERFACE, p.bridge, p.slots, &residual)?))
+        let [residual, ratio] = [config.estimator.has_residual(), config.estimator == Estimator::Residual].map(u32::from);
+        let constants = [residual, ratio, config.samples_per_side];
+        Ok(Self(ComputePipeline::new(p.build, p.modules, &INTERFACE, p.bridge, p.slots, &constants)?))
     }
 
     pub fn record(&self, rec: &mut Recorder<'_>, io: &Io<'_>) {
