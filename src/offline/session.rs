@@ -1,7 +1,6 @@
 //! A world on a device: uploaded once, rendered frame by frame, read back.
 
-use crate::Config;
-use crate::distribution::chart;
+use crate::distribution::{LobeFit, chart};
 use crate::gpu::access::Access;
 use crate::gpu::buffer::Buffer;
 use crate::gpu::image::ImageDesc;
@@ -25,6 +24,7 @@ use crate::pass::{PassContext, brdf_map, cluster_moments, vmf_mips};
 use crate::plan::Levels;
 use crate::renderer::Renderer;
 use crate::sampling::LatLong;
+use crate::{Config, View};
 use ash::vk;
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -316,6 +316,16 @@ impl Session {
     pub(crate) fn sources(&self) -> (bool, u32) {
         let area = self.shown.lights.iter().filter(|light| light.is_area()).count();
         (self.shown.environment.intensity > 0.0, area as u32)
+    }
+
+    /// The fit that stands for each material where light is looked up, if one does.
+    pub(crate) fn fits(&self) -> &[Option<Arc<LobeFit>>] {
+        self.renderer.as_ref().map_or(&[], Renderer::fits)
+    }
+
+    /// What the camera of the next frame sees.
+    pub(crate) fn view(&self) -> &View {
+        &self.shown.view
     }
 
     /// Levels of shading.
