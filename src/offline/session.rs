@@ -163,6 +163,16 @@ impl Session {
         of_maps(renderer)
     }
 
+    /// Replaces the environment's map from the next frame on, with all that is made of it.
+    ///
+    /// # Errors
+    /// The library's or the device's.
+    pub fn renew_environment(&mut self, map: &LatLong) -> Result<()> {
+        let renderer = self.renderer.as_mut().ok_or_else(closed)?;
+        // SAFETY: every submission is waited for; the command buffer is recording and submitted at once.
+        self.headless.submit(|cmd, memory| Ok(unsafe { renderer.record_environment(cmd, map, memory) }?))
+    }
+
     /// Draws for all objects; what they need is taken out of `former` or uploaded.
     fn upload_objects(&mut self, world: &World, former: &mut HashMap<usize, MeshBuffers>) -> Result<()> {
         for (number, object) in (0u32..).zip(&world.objects) {
