@@ -14,7 +14,7 @@ use passband::offline::image_io::LinearImage;
 use passband::offline::reference::MIN_COSINE;
 use passband::offline::render::{Settings, render};
 use passband::offline::world::World;
-use passband::{Config, Estimator, Filter, Rate};
+use passband::{Config, Estimator, Filter, Light, Rate};
 use std::sync::OnceLock;
 use support::frames::{config, table, world};
 
@@ -26,7 +26,7 @@ fn scene() -> World {
 
 /// A fit by so few lobes that it misses something everywhere.
 fn residual(rate: Rate) -> Config {
-    Config { rate, fit_lobes: 8, lmax: 3, ..config(EXTENT, Estimator::Residual, 16) }
+    Config { rate, fit_lobes: 8, lmax: 3, residual_errors: [0.0, 0.1, 0.25], ..config(EXTENT, Estimator::Residual, 16) }
 }
 
 fn fit() -> &'static LobeFit {
@@ -87,7 +87,7 @@ fn errors_are_those_of_the_fit_at_the_view_angle() {
 fn what_is_left_out_has_a_factor_of_one_and_nothing_else_has() {
     let world = scene();
     let plain = layers(&world, residual(Rate::Full), &[Aov::FitError, Aov::Decision]);
-    // By default something is estimated everywhere: at every sample, for itself.
+    // Something is estimated at every sample, for itself.
     assert!(layer(&plain, "decision.Y").iter().zip(layer(&plain, "A")).all(|(d, a)| *d == if *a > 0.0 { 2.0 } else { -1.0 }));
     let negligible = quantile(&plain, 0.5);
     let errors = [negligible, 1.0, 2.0];
@@ -146,4 +146,18 @@ fn levels_follow_from_errors() {
         let pixels = layer(&image, "decision.Y").iter().zip(layer(&image, "A"));
         assert!(pixels.into_iter().all(|(d, a)| *d == if *a > 0.0 { expected } else { -1.0 }), "{estimator:?}");
     }
+}
+
+#[test]
+fn area_lights_are_not_left_out() {
+    let mut world = scene();
+    world.environment.as_mut().unwrap().intensity = 0.2;
+    world.lights.push(Light::Sphere { position: [1.5, 2.5, 2.0], radius: 0.4, radiance: [30.0; 3] });
+    let all = Config { residual_errors: [2.0; 3], ..residual(Rate::Full) };
+    let image = layers(&world, all, &[Aov::Decision]);
+    let alone = layers(&world, Config { estimator: Estimator::Mis, directions: 256, ..residual(Rate::Full) }, &[]);
+    let sum = |image: &LinearImage| layer(image, "G").iter().map(|v| f64::from(*v)).sum::<f64>();
+    let ratio = sum(&image) / sum(&alone);
+    assert!((ratio - 1.0).abs() < 0.02, "{ratio}");
+    assert!(layer(&image, "decision.Y").iter().zip(layer(&image, "A")).all(|(d, a)| *d == if *a > 0.0 { 2.0 } else { -1.0 }));
 }

@@ -12,7 +12,7 @@ use glam::{DVec3, Vec3};
 pub enum Decision {
     /// There is no surface.
     Background,
-    /// Nothing: the fit misses too little, or nothing is ever estimated.
+    /// Nothing: the fit misses too little and there are no area lights, or nothing is ever estimated.
     Nothing,
     /// It is up-sampled from coarser cells.
     UpSampled,
@@ -77,7 +77,7 @@ pub fn decisions(session: &mut Session, config: &Config) -> Result<Vec<Decision>
             _ => Decision::Shaded(level),
         };
     }
-    if config.estimator == Estimator::Residual {
+    if config.estimator == Estimator::Residual && session.sources().1 == 0 {
         let negligible = config.residual_errors[0];
         for (found, error) in all.iter_mut().zip(fit_errors(session)?) {
             if *found != Decision::Background && error <= negligible {

@@ -131,7 +131,7 @@ fn panel(area: &Area<'_>, x_name: &str, curves: &[Curve<'_>], measure: &Measure,
         .margin(14)
         .x_label_area_size(48)
         .y_label_area_size(84)
-        .build_cartesian_2d(width.clone().log_scale(), height.log_scale())?;
+        .build_cartesian_2d(width.clone().log_scale().base(2.0), height.log_scale())?;
     chart
         .configure_mesh()
         .light_line_style(WHITE)

@@ -89,13 +89,12 @@ pub const RESIDUAL: &[Family] = &[
     Family { name: "base", estimator: Estimator::Preconvolved, directions: &[1], ..FULL },
     Family { name: "cv", estimator: Estimator::Cv, directions: &[16], more: &[4, 64], ..FULL },
     Family { name: "residual", estimator: Estimator::Residual, directions: &[16, 64], more: &[256], ..BANDWIDTH },
-    Family { name: "full brdf-random", estimator: Estimator::BrdfRandom, directions: &[64], more: &[256], ..FULL },
+    Family { name: "full brdf-random", estimator: Estimator::BrdfRandom, directions: &[64], ..FULL },
     Family { name: "bandwidth", directions: &[64], more: &[16, 256], ..BANDWIDTH },
     base("base lobes=4", |c| c.fit_lobes = 4),
     base("base lobes=8", |c| c.fit_lobes = 8),
-    base("base lobes=15", |c| c.fit_lobes = 15),
-    further_residual("residual everywhere", |c| c.residual_errors = [0.0; 3]),
-    further_residual("residual coarser", |c| c.residual_errors = [0.0, 0.2, 0.5]),
+    further_residual("residual above .05", |c| c.residual_errors = [0.05, 0.1, 0.25]),
+    further_residual("residual above .2", |c| c.residual_errors = [0.2, 0.2, 0.25]),
 ];
 
 /// Another fit than the default, in the full preset.
