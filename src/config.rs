@@ -179,7 +179,7 @@ pub struct Config {
     pub fit_lobes: u32,
     /// The mean error of a fit at which fewer lobes are enough, 0 to 1.
     pub fit_error: f64,
-    /// Errors of a fit up to which the residual of [`Estimator::Residual`] is left out; with [`Rate::Bandwidth`] is shaded at the
+    /// Errors of a fit up to which the residual of [`Estimator::Residual`] is left out, unless it holds area lights; with [`Rate::Bandwidth`] is shaded at the
     /// coarsest level; is shaded at that of half the pixels a side. Beyond it is shaded at every sample.
     pub residual_errors: [f32; 3],
     /// Whether lobes are taken to be what look-ups of them hold, texel by texel, and none to be sharper than the sharpest level: with

@@ -1,5 +1,6 @@
 //! What the offline part reads back from a renderer, and what it records beside frames.
 
+use crate::distribution::LobeFit;
 use crate::error::{Error, Result};
 use crate::frame::FrameInputs;
 use crate::gpu::buffer::Buffer;
@@ -10,6 +11,7 @@ use crate::gpu::recorder::Recorder;
 use crate::pass::maps::MomentArrays;
 use crate::renderer::Renderer;
 use ash::vk;
+use std::sync::Arc;
 
 impl Renderer {
     /// One of the renderer's own colour images of the last frame, or the environment's bandwidth, by name.
@@ -66,6 +68,11 @@ impl Renderer {
     /// Bytes of the materials' lobe fits.
     pub(crate) fn fit_bytes(&self) -> u64 {
         self.materials.as_ref().and_then(|(images, _)| images.fits.as_ref()).map_or(0, |fits| fits.size)
+    }
+
+    /// The fit that stands for each material where light is looked up, if one does.
+    pub(crate) fn fits(&self) -> &[Option<Arc<LobeFit>>] {
+        self.materials.as_ref().map_or(&[], |(images, _)| &images.fitted)
     }
 
     /// Layout of set 1.

@@ -11,7 +11,7 @@ use passband::offline::scene::Scene;
 use passband::offline::sequence::render_frames;
 use passband::offline::session::Session;
 use passband::offline::stats::Stats;
-use passband::{Config, Rate, Requirements};
+use passband::{Config, Estimator, Rate, Requirements};
 use std::ops::Range;
 use std::process::Command;
 use std::sync::Arc;
@@ -241,6 +241,45 @@ fn no_frame_of_the_built_in_animation_has_a_hole_or_shades_more_than_all() {
                 // Sky light comes from everywhere.
                 assert!(rgb.iter().all(|c| c.is_finite()) && (*alpha == 0.0 || rgb.iter().sum::<f32>() > 0.0), "{i}: {rgb:?}");
             }
+        }
+    }
+}
+
+/// Of light that is looked up: frames do not depend on each other either, and are those that estimates alone tend to.
+#[test]
+fn light_that_is_looked_up_moves_with_what_moves() {
+    let mut world = Scene::load("waves", &[]).unwrap().animated().unwrap();
+    let estimated = |estimator, rate, directions| {
+        let config = Config { estimator, rate, directions, ..Config::new([128, 96]) };
+        Settings { device: device(), ..Settings::new(config) }
+    };
+    let (truth, _) = frames(&mut world, &estimated(Estimator::Mis, Rate::Full, 512), 20..22);
+    let distance = |a: &LinearImage, b: &LinearImage| {
+        let pixels = a.rgb().unwrap().into_iter().zip(b.rgb().unwrap()).zip(b.channel("A").unwrap().to_vec());
+        let covered = pixels.filter(|(_, alpha)| *alpha > 0.0);
+        let (off, all) = covered.fold((0.0, 0.0), |(off, all), ((a, b), _)| {
+            let of = |c: [f32; 3]| DVec3::from(c.map(f64::from));
+            (off + (of(a) - of(b)).abs().element_sum(), all + of(b).element_sum())
+        });
+        off / all
+    };
+    let moved = distance(&truth[0], &truth[1]);
+    for (estimator, rate) in
+        [(Estimator::Preconvolved, Rate::Full), (Estimator::Cv, Rate::Full), (Estimator::Residual, Rate::Bandwidth)]
+    {
+        let settings = estimated(estimator, rate, 64);
+        let (all, stats) = frames(&mut world, &settings, 20..22);
+        // The second without the first.
+        let (alone, _) = frames(&mut world, &settings, 21..22);
+        assert!(alone[0].channels == all[1].channels, "{estimator:?}");
+        assert!(stats.validation_messages.is_empty());
+        for ((found, truth), number) in all.iter().zip(&truth).zip(20..) {
+            let apart = distance(found, truth);
+            println!("{estimator:?}, frame {number}: {apart:.4} off, two frames are {moved:.3} apart");
+            assert!(apart < 0.03 && apart < 0.3 * moved, "{estimator:?}, frame {number}: {apart}, moved {moved}");
+            let pixels = found.rgb().unwrap().into_iter().zip(found.channel("A").unwrap());
+            let dark = pixels.filter(|(rgb, alpha)| **alpha > 0.0 && rgb.iter().sum::<f32>() <= 0.0);
+            assert_eq!(dark.count(), 0, "{estimator:?}, frame {number} has holes");
         }
     }
 }

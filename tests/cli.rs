@@ -80,7 +80,8 @@ fn every_documented_flag_works_or_is_not_supported_yet() {
     let folder = Folder::new("flags");
     let filters = "point naive fixed toksvig toksvig-lobe lean lean-lobe leadr tk fournier4 fournier7 gmm gmm-unaligned vmf1 vmf4 \
                    vmf8 vmf clusters bruteforce supersample";
-    let layers = "level weight samples bandwidth spread shaded lobes mip depth normal material curvature uv base residual";
+    let layers = "level weight samples bandwidth spread shaded lobes mip depth normal material curvature uv base residual \
+                  fit-error decision";
     let choices = [
         ("--rate", "full half quarter luminance bandwidth oracle"),
         ("--estimator", "mis brdf brdf-random preconvolved cv residual"),
@@ -105,7 +106,8 @@ fn every_documented_flag_works_or_is_not_supported_yet() {
             let predicted = flag == "--literal" || ["bandwidth", "spread"].contains(&value) && flag == "--aov";
             let beside: &[&str] = match value {
                 _ if predicted => &["--rate", "bandwidth"],
-                "base" => &["--estimator", "preconvolved"],
+                "base" | "fit-error" => &["--estimator", "preconvolved"],
+                "decision" => &["--estimator", "residual", "--rate", "bandwidth"],
                 "residual" if flag == "--aov" => &["--estimator", "residual", "--rate", "bandwidth"],
                 "lobes" => &["--filter", "vmf"],
                 _ => &[],
@@ -141,6 +143,8 @@ fn every_documented_flag_works_or_is_not_supported_yet() {
         "--aov curvature",
         "--aov bandwidth",
         "--aov spread",
+        "--aov fit-error",
+        "--aov decision",
         "--frames 0..3",
         "--literal eq8",
     ] {
@@ -166,6 +170,9 @@ fn wrong_arguments_end_with_2_and_leave_nothing() {
         (&["furnace", "-o", "out"], &["--output", "out"]),
         (&["furnace", "--aov", "albedo"], &["--aov", "depth", "`albedo`"]),
         (&["furnace", "--aov", "depth,"], &["--aov"]),
+        (&["furnace", "--aov", "fit-error", "--samples", "2"], &["--aov fit-error", "preconvolved, cv or residual", "mis"]),
+        (&["furnace", "--aov", "decision", "--samples", "2"], &["--aov decision", "preconvolved, cv or residual", "mis"]),
+        (&["furnace", "--aov", "residual", "--estimator", "preconvolved"], &["--aov residual", "cv or residual"]),
         (&["furnace", "--samples", "0"], &["2 to 65536", "got 0"]),
         (&["furnace", "--samples", "1"], &["2 to 65536", "got 1"]),
         (&["furnace", "--samples", "0", "--estimator", "brdf"], &["1 to 65536", "got 0"]),

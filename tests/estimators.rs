@@ -120,7 +120,7 @@ fn every_estimator_has_the_reference_as_its_mean() {
     for (mesh, model) in [("bumpy-sphere", table("metallic-paint")), ("torus-knot", coated)] {
         let world = world(mesh, 48, model, sky("studio"));
         for estimator in [Estimator::Mis, Estimator::Brdf, Estimator::BrdfRandom, Estimator::Cv, Estimator::Residual] {
-            let exact = Config { exact_lobes: true, ..config(EXTENT, estimator, 128) };
+            let exact = Config { exact_lobes: true, residual_errors: [0.0; 3], ..config(EXTENT, estimator, 128) };
             // Beside looked-up light there is little noise.
             let frames = if estimator.looks_up() { 48 } else { 256 };
             assert_unbiased(&format!("{mesh}, {estimator:?}"), &world, &exact, frames, [2e-3, ROUNDING]);
@@ -158,7 +158,7 @@ fn a_small_sun_in_a_mirror_is_not_noisy() {
 fn frames_depend_on_their_seeds_and_on_nothing_else() {
     let world = world("bumpy-sphere", 48, table("metallic-paint"), sky("sun-sky"));
     for estimator in [Estimator::Mis, Estimator::Brdf, Estimator::BrdfRandom, Estimator::Cv, Estimator::Residual] {
-        let config = config(EXTENT, estimator, 16);
+        let config = Config { residual_errors: [0.0; 3], ..config(EXTENT, estimator, 16) };
         let (mut one, mut other) = (Stage::new(&world, &config), Stage::new(&world, &config));
         let first = one.frame([1, 0]);
         let frames = [[1, 0], [2, 0], [1, 1], [1, 0]].map(|seed| other.frame(seed));

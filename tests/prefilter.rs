@@ -310,6 +310,41 @@ fn frames_agree_with_the_twins() {
     }
 }
 
+/// As where light changes in every frame: all that is made of it is made anew, and nothing is left of what was.
+#[test]
+fn another_environment_in_every_frame_is_as_good_as_a_fresh_one() {
+    let maps = ["studio", "sun-sky", "constant"].map(|name| builtin::environment(name, 256).unwrap());
+    let mut brighter = maps[1].clone();
+    brighter = LatLong::new(256, 128, brighter.texels().iter().map(|t| t.map(|c| 1.5 * c)).collect()).unwrap();
+    let smaller = builtin::environment("studio", 128).unwrap();
+    for (estimator, rate) in
+        [(Estimator::Preconvolved, Rate::Full), (Estimator::Cv, Rate::Full), (Estimator::Residual, Rate::Bandwidth)]
+    {
+        let config = Config { rate, fit_lobes: 8, ..config([48, 32], estimator, 8) };
+        let open = |map: &LatLong| {
+            let world = world("bumpy-sphere", 48, table("satin"), map.clone());
+            let options = Options { device: Some("llvmpipe".into()), validate: true };
+            Session::new(Headless::new(&options, &Requirements::of(&config)).unwrap(), &world, &config).unwrap()
+        };
+        let frame = |session: &mut Session, number: u32| {
+            session.frame([3, number]).unwrap();
+            assert_eq!(session.messages(), [""; 0]);
+            session.image("resolved").unwrap().0
+        };
+        let mut session = open(&maps[0]);
+        let mut images = vec![frame(&mut session, 0)];
+        let mut bytes = Vec::new();
+        for (number, map) in (1..).zip([&maps[1], &brighter, &maps[2], &smaller, &maps[0]]) {
+            session.renew_environment(map).unwrap();
+            images.push(frame(&mut session, number));
+            bytes.push(session.headless().live_bytes());
+            assert!(images[number as usize] == frame(&mut open(map), number), "{estimator:?}, frame {number}");
+        }
+        assert!(images.windows(2).all(|pair| pair[0] != pair[1]));
+        assert!(bytes[0] == bytes[1] && bytes[1] == bytes[4] && bytes[3] < bytes[4], "{bytes:?}: what was is freed");
+    }
+}
+
 /// What has to be sampled or is not shaded everywhere is refused.
 #[test]
 fn what_it_cannot_express_is_refused() {

@@ -227,8 +227,18 @@ fn microfacet_normals_fill_the_projected_area() {
 
 #[test]
 fn stand_ins_are_what_they_are_called() {
-    let names =
-        ["mirror-metal", "metallic-paint", "rough", "red-paint", "shift-paint", "gloss-plastic", "satin", "rubber", "felt"];
+    let names = [
+        "mirror-metal",
+        "metallic-paint",
+        "rough",
+        "red-paint",
+        "shift-paint",
+        "gloss-plastic",
+        "satin",
+        "rubber",
+        "felt",
+        "noisy-paint",
+    ];
     assert_eq!(stand_in::names(), names);
     assert!(stand_in::table("chrome").is_none());
     let normal = |name: &str| stand_in::table(name).unwrap().evaluate(DVec3::Z, DVec3::Z);
@@ -264,6 +274,37 @@ fn stand_ins_differ_in_the_way_they_are_named() {
     assert!(back("rubber", 70.0) < 1.1, "{}", back("rubber", 70.0));
     // Rubber is dark.
     assert!(at("rubber", 20.0, 20.0, 90.0).max_element() < 0.1 * at("rough", 20.0, 20.0, 90.0).max_element() + 0.02);
+}
+
+#[test]
+fn noise_is_of_each_cell_and_the_same_every_time() {
+    let [plain, noisy, again] = ["metallic-paint", "noisy-paint", "noisy-paint"].map(|name| stand_in::table(name).unwrap());
+    // Away from the horizon, at cells' centres; rows and columns run over the innermost two axes.
+    let ratio = |half: u32, diff: u32, phi: u32| {
+        let angles = Angles {
+            theta_half: FRAC_PI_2 * ((f64::from(half) + 0.5) / 90.0).powi(2),
+            theta_diff: (f64::from(diff) + 0.5).to_radians(),
+            phi_diff: (f64::from(phi) + 0.5).to_radians(),
+        };
+        let (wi, wo) = angles.directions();
+        assert_eq!(noisy.evaluate(wi, wo), again.evaluate(wi, wo));
+        let ratio = noisy.evaluate(wi, wo) / plain.evaluate(wi, wo);
+        assert!((ratio - ratio.x).abs().max_element() < 1e-3, "grey: {ratio}");
+        ratio.x
+    };
+    let cells: Vec<[u32; 3]> =
+        (0..30_u32).flat_map(|i| (0..40).flat_map(move |j| (0..50).map(move |k| [i + 5, j, 3 * k]))).collect();
+    let all: Vec<f64> = cells.iter().map(|&[i, j, k]| ratio(i, j, k)).collect();
+    let mean = |values: &mut dyn Iterator<Item = f64>| values.sum::<f64>() / all.len() as f64;
+    let average = mean(&mut all.iter().copied());
+    let deviation = mean(&mut all.iter().map(|r| (r - average).powi(2))).sqrt();
+    // Of a log-normal factor with a deviation of 0.2 in its logarithm: sqrt(exp(0.04) - 1).
+    assert!((average - 1.0).abs() < 5e-3 && (deviation - 0.202).abs() < 5e-3, "{average} {deviation}");
+    for step in [1, 50, 2000] {
+        let pairs = all.iter().zip(all.iter().skip(step));
+        let correlation = pairs.map(|(a, b)| (a - average) * (b - average)).sum::<f64>() / all.len() as f64 / deviation.powi(2);
+        assert!(correlation.abs() < 0.02, "{step}: {correlation}");
+    }
 }
 
 #[test]

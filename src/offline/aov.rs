@@ -1,8 +1,8 @@
 //! Layers beside radiance: what the frame's own images hold, at one shading sample an output pixel.
 
 use crate::offline::error::{Error, Result};
-use crate::offline::levels;
 use crate::offline::session::Session;
+use crate::offline::{decision, levels};
 use crate::{Config, Estimator};
 
 /// A layer that `--aov` names.
@@ -38,11 +38,16 @@ pub enum Aov {
     Base,
     /// What is estimated beside that: radiance to add (`cv`), or the factor on it (`residual`).
     Residual,
+    /// Share of the light that the fit of the sample's material misses at its view angle; 1 where no fit stands for the material.
+    FitError,
+    /// What is done about that ([`decision::Decision`]): -1 no surface, 0 nothing, 1 up-sampled, 2 shaded for the sample itself, 3 for a cell
+    /// of 2x2 samples, and so on.
+    Decision,
     /// Lobes that the filter found, 0 where the material's own stay.
     Lobes,
 }
 
-const ALL: [(&str, Aov); 16] = [
+const ALL: [(&str, Aov); 18] = [
     ("depth", Aov::Depth),
     ("normal", Aov::Normal),
     ("material", Aov::Material),
@@ -58,6 +63,8 @@ const ALL: [(&str, Aov); 16] = [
     ("samples", Aov::Samples),
     ("base", Aov::Base),
     ("residual", Aov::Residual),
+    ("fit-error", Aov::FitError),
+    ("decision", Aov::Decision),
     ("lobes", Aov::Lobes),
 ];
 const LATER: [&str; 1] = ["mip"];
@@ -182,15 +189,23 @@ impl Aov {
                 let expected = "--estimator cv or residual beside it";
                 Err(Error::argument("--aov residual", expected, config.estimator.name()))
             }
+            Self::Base | Self::FitError | Self::Decision if !config.estimator.looks_up() => {
+                let expected = "--estimator preconvolved, cv or residual beside it";
+                Err(Error::argument(format!("--aov {name}"), expected, config.estimator.name()))
+            }
+            Self::FitError => {
+                let errors = decision::fit_errors(session)?.into_iter().map(f32::to_bits).collect();
+                scalar(covered.of(errors).map(|t| f32::from_bits(t[0])))
+            }
+            Self::Decision => {
+                let codes = decision::decisions(session, config)?.into_iter().map(|d| d.code().to_bits()).collect();
+                scalar(covered.of(codes).map(|t| f32::from_bits(t[0])))
+            }
             Self::Base | Self::Residual => {
                 let image = match config.estimator {
                     Estimator::Preconvolved => "radiance",
-                    Estimator::Cv | Estimator::Residual if self == Self::Residual => "radiance",
-                    Estimator::Cv | Estimator::Residual => "base",
-                    _ => {
-                        let expected = "--estimator preconvolved, cv or residual beside it";
-                        return Err(Error::argument("--aov base", expected, config.estimator.name()));
-                    }
+                    _ if self == Self::Residual => "radiance",
+                    _ => "base",
                 };
                 let radiance = float(image, "RGB", 0, session)?;
                 let covered = |(name, values): Channel| {

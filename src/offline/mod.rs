@@ -6,6 +6,7 @@ pub mod aov;
 pub mod bench;
 pub mod builtin;
 mod cache;
+pub mod decision;
 pub mod environment;
 pub mod error;
 pub mod fit_cache;

@@ -1,7 +1,6 @@
 //! A world on a device: uploaded once, rendered frame by frame, read back.
 
-use crate::Config;
-use crate::distribution::chart;
+use crate::distribution::{LobeFit, chart};
 use crate::gpu::access::Access;
 use crate::gpu::buffer::Buffer;
 use crate::gpu::image::ImageDesc;
@@ -25,6 +24,7 @@ use crate::pass::{PassContext, brdf_map, cluster_moments, vmf_mips};
 use crate::plan::Levels;
 use crate::renderer::Renderer;
 use crate::sampling::LatLong;
+use crate::{Config, View};
 use ash::vk;
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -161,6 +161,16 @@ impl Session {
         // SAFETY: every submission is waited for; the command buffer is recording and submitted at once.
         self.headless.submit(|cmd, memory| Ok(unsafe { renderer.record_materials(cmd, &materials, memory) }?))?;
         of_maps(renderer)
+    }
+
+    /// Replaces the environment's map from the next frame on, with all that is made of it.
+    ///
+    /// # Errors
+    /// The library's or the device's.
+    pub fn renew_environment(&mut self, map: &LatLong) -> Result<()> {
+        let renderer = self.renderer.as_mut().ok_or_else(closed)?;
+        // SAFETY: every submission is waited for; the command buffer is recording and submitted at once.
+        self.headless.submit(|cmd, memory| Ok(unsafe { renderer.record_environment(cmd, map, memory) }?))
     }
 
     /// Draws for all objects; what they need is taken out of `former` or uploaded.
@@ -316,6 +326,16 @@ impl Session {
     pub(crate) fn sources(&self) -> (bool, u32) {
         let area = self.shown.lights.iter().filter(|light| light.is_area()).count();
         (self.shown.environment.intensity > 0.0, area as u32)
+    }
+
+    /// The fit that stands for each material where light is looked up, if one does.
+    pub(crate) fn fits(&self) -> &[Option<Arc<LobeFit>>] {
+        self.renderer.as_ref().map_or(&[], Renderer::fits)
+    }
+
+    /// What the camera of the next frame sees.
+    pub(crate) fn view(&self) -> &View {
+        &self.shown.view
     }
 
     /// Levels of shading.

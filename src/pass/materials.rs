@@ -1,6 +1,7 @@
 //! Pass 0b: reflectance tables and importance tables, uploaded on change (Bagher 2011, section 3.3).
 
 use crate::config::Estimator;
+use crate::distribution::LobeFit;
 use crate::distribution::fitter::Budget;
 use crate::error::{Error, Result};
 use crate::gpu::access::Access;
@@ -62,6 +63,9 @@ pub(crate) struct MaterialImages {
     pub bandwidths: Option<Bandwidths>,
     /// Of all materials, if light is looked up.
     pub fits: Option<Buffer>,
+    /// What these hold, material by material.
+    #[cfg_attr(not(feature = "offline"), expect(dead_code, reason = "only `offline` reads them back"))]
+    pub fitted: Vec<Option<Arc<LobeFit>>>,
 }
 
 /// Created and filled, not yet recorded.
@@ -74,6 +78,7 @@ pub(crate) struct MaterialsUpload {
     maps: MapsUpload,
     bandwidths: Option<(ImageUpload, BufferUpload)>,
     fits: Option<BufferUpload>,
+    fitted: Vec<Option<Arc<LobeFit>>>,
     pub kinds: Kinds,
 }
 
@@ -243,14 +248,15 @@ impl MaterialsUpload {
             true => fits::of(materials, &maps.found, reading.widened, *budget),
             false => vec![None; materials.len()],
         };
-        let fitted = Packed::of(&fits);
-        records.iter_mut().zip(&fitted.firsts).for_each(|(record, first)| record.kind[3] = *first);
+        let packed_fits = Packed::of(&fits);
+        records.iter_mut().zip(&packed_fits.firsts).for_each(|(record, first)| record.kind[3] = *first);
         let models = materials.iter().fold(0, |bits, m| bits | 1 << number(&m.model));
-        let kinds = Kinds::of(materials, &maps.found, &fitted, reading.filter, if estimator.looks_up() { models } else { 0 });
+        let kinds =
+            Kinds::of(materials, &maps.found, &packed_fits, reading.filter, if estimator.looks_up() { models } else { 0 });
         let storage = vk::BufferUsageFlags::STORAGE_BUFFER;
         let fit_upload = estimator
             .looks_up()
-            .then(|| BufferUpload::new(build, "lobe fits", storage, bytemuck::cast_slice(&fitted.words)))
+            .then(|| BufferUpload::new(build, "lobe fits", storage, bytemuck::cast_slice(&packed_fits.words)))
             .transpose()?;
         let bandwidths = eps.map(|eps| bandwidths(build, materials, &mut records, eps)).transpose()?;
         let left: Vec<_> = fits.iter().map(|fit| fit.as_deref().filter(|_| estimator.has_residual())).collect();
@@ -278,6 +284,7 @@ impl MaterialsUpload {
             maps,
             bandwidths,
             fits: fit_upload,
+            fitted: fits,
             kinds,
         })
     }
@@ -309,6 +316,7 @@ impl MaterialsUpload {
                 .bandwidths
                 .map(|(lobes, textures)| Bandwidths { lobes: lobes.record(rec, bag), textures: textures.record(rec, bag) }),
             fits: self.fits.map(|fits| fits.record(rec, bag)),
+            fitted: self.fitted,
         }
     }
 }

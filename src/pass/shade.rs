@@ -189,7 +189,8 @@ impl Shade {
             environment_samples: environment,
             light_samples: light,
             offset,
-            negligible: self.negligible,
+            // What area lights shine is in no fit.
+            negligible: if light > 0 { -1.0 } else { self.negligible },
         };
         let pipeline = &self.pipelines[usize::from(io.light_count > 0)];
         pipeline.bind(rec, io.bridge, &resources, &push);

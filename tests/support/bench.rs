@@ -1,4 +1,5 @@
 //! `passband bench` in a folder of its own.
+#![allow(dead_code, reason = "each test file uses its part")]
 
 use serde_json::Value;
 use std::path::{Path, PathBuf};

@@ -52,11 +52,11 @@ pub struct Args {
     /// Write everything that was found
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
-    /// Write plots of error over time and over shaded pixels into this folder, one for each scene
+    /// Write plots of error over time and over directions into this folder, one for each scene; of bagher over shaded pixels, too
     #[arg(long, value_name = "FOLDER")]
     plots: Option<PathBuf>,
-    /// Write figures into this folder: of bagher those of Bagher et al. 2011 (6, 11, 12, 14 and 15), of each scene of the quick
-    /// preset or named here; of xu and tan the truth beside every filter, of each scene
+    /// Write figures into this folder: of bagher those of Bagher et al. 2011 (6, 11, 12, 14 and 15), of residual what is looked up,
+    /// what that leaves and the result, both of each scene of the quick preset or named here; of xu and tan the truth beside every filter, of each scene
     #[arg(long, value_name = "FOLDER")]
     figures: Option<PathBuf>,
     /// Write a page to look at
@@ -145,7 +145,7 @@ impl Args {
             }
         };
         let pictured = self.plots.is_some() || self.figures.is_some();
-        later(pictured && suite != suites::Suite::Bagher, "--plots and --figures of a suite other than bagher and xu")?;
+        later(pictured && suite == suites::Suite::Passes, "--plots and --figures of the suite passes")?;
         Ok(suites::Order {
             suite,
             preset: self.preset(),

@@ -2,6 +2,7 @@
 
 use super::{aligned, bounded};
 use passband::offline::bench::cases::Half;
+use passband::offline::bench::environment::EnvironmentTimes;
 use passband::offline::bench::reached::{Reached, Way};
 use passband::offline::bench::report::{Report, SceneReport};
 use passband::offline::bench::statistics::Ratio;
@@ -152,7 +153,7 @@ pub fn targets(targets: &[Target]) -> String {
 pub fn environments(scenes: &[SceneReport]) -> String {
     let row = |scene: &SceneReport| {
         let e = scene.environment.as_ref()?;
-        let ms = [e.bandwidth_ms, e.upload_ms, e.prepare_ms].map(|s| format!("{:.2}", s.median));
+        let ms = [e.bandwidth_ms?, e.upload_ms, e.prepare_ms].map(|s| format!("{:.2}", s.median));
         let record = scene.row("bandwidth 64").map_or(String::new(), |row| format!("{:.3}", row.record_ms.median));
         let size = format!("{}x{}", e.extent[0], e.extent[1]);
         Some([scene.name.clone(), size].into_iter().chain(ms).chain([record]).collect())
@@ -160,4 +161,16 @@ pub fn environments(scenes: &[SceneReport]) -> String {
     let header =
         ["scene", "map", "environment_bandwidth ms", "upload ms", "CPU: tables ms", "CPU: recording a predicted frame ms"];
     aligned(&header, 1, scenes.iter().filter_map(row))
+}
+
+/// What an environment costs that is pre-convolved in every frame, beside the frame that looks it up.
+pub fn rebuilt(scenes: &[SceneReport]) -> String {
+    let rows = scenes.iter().flat_map(|scene| scene.rebuilt.iter().map(move |times| (scene, times)));
+    let row = |(scene, e): (&SceneReport, &EnvironmentTimes)| {
+        let ms = [e.prefilter_ms?, e.upload_ms, e.prepare_ms].map(|s| format!("{:.2}", s.median));
+        let frame = scene.row("base 1").map_or(String::new(), |row| format!("{:.2}", row.frame_ms.median));
+        Some([scene.name.clone(), format!("{}x{}", e.extent[0], e.extent[1])].into_iter().chain(ms).chain([frame]).collect())
+    };
+    let header = ["environment of", "map", "prefilter ms", "upload ms", "CPU: tables ms", "frame of the base ms"];
+    aligned(&header, 1, rows.filter_map(row))
 }

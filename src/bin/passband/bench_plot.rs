@@ -1,10 +1,12 @@
-//! Rate and distortion: error over frame time, over directions and over shaded pixels, one curve a way of shading.
+//! Rate and distortion: error over frame time and over directions, and over shaded pixels where curves of that are known, one curve a
+//! way of shading.
 
 use crate::sheet::{self, Area, Drawn, legend};
 use passband::offline::bench::curves::Curve as Without;
 use passband::offline::bench::report::{Row, SceneReport};
 use passband::offline::bench::runner::Part;
 use passband::offline::error::Result;
+use passband::offline::metrics::Metrics;
 use plotters::prelude::*;
 use std::path::Path;
 
@@ -44,10 +46,16 @@ pub fn write(path: &Path, scene: &SceneReport) -> Result<()> {
     let title = format!("{}, {}x{}", scene.name, scene.extent[0], scene.extent[1]);
     sheet::write(path, SIZE, &title, |root| {
         let panels = root.split_evenly((1, 3));
-        let [time, rate, shaded] = panels.as_slice() else { return Err("the sheet has three panels".into()) };
-        panel(time, "frame, ms", &curves, noise, |row| row.frame_ms.median)?;
-        panel(rate, "directions a covered pixel: N times the shaded share", &curves, noise, Row::directions)?;
-        reconstruction(shaded, &curves, &scene.curves)
+        let [time, rate, third] = panels.as_slice() else { return Err("the sheet has three panels".into()) };
+        let linear = Measure { name: "RMSE, linear radiance", of: |e| e.rmse, noise };
+        panel(time, "frame, ms", &curves, &linear, |row| row.frame_ms.median)?;
+        panel(rate, "directions a covered pixel: N times the shaded share", &curves, &linear, Row::directions)?;
+        if !scene.curves.is_empty() {
+            return reconstruction(third, &curves, &scene.curves);
+        }
+        let noise = scene.reference.as_ref().map_or(0.0, |r| displayed(r.noise.psnr));
+        let shown = Measure { name: "RMS error as displayed", of: |e| displayed(e.psnr), noise };
+        panel(third, "frame, ms", &curves, &shown, |row| row.frame_ms.median)
     })
 }
 
@@ -84,8 +92,23 @@ fn reconstruction(area: &Area<'_>, known: &[Curve<'_>], curves: &[Without]) -> D
     legend(&mut chart, SeriesLabelPosition::UpperRight)
 }
 
-fn error(row: &Row) -> f64 {
-    row.error.as_ref().map_or(f64::NAN, |e| e.rmse)
+/// What is on the vertical axis.
+struct Measure {
+    name: &'static str,
+    of: fn(&Metrics) -> f64,
+    /// Of the reference.
+    noise: f64,
+}
+
+impl Measure {
+    fn of(&self, row: &Row) -> f64 {
+        row.error.as_ref().map_or(f64::NAN, self.of)
+    }
+}
+
+/// The root mean square of what a PSNR is of.
+fn displayed(psnr: f64) -> f64 {
+    10_f64.powf(-psnr / 20.0)
 }
 
 /// A range with some space around all positive `values`; of 1 to 10 if there is none.
@@ -99,15 +122,16 @@ fn number(v: &f64) -> String {
     if *v >= 0.1 { format!("{v}") } else { format!("{v:.0e}") }
 }
 
-fn panel(area: &Area<'_>, x_name: &str, curves: &[Curve<'_>], noise: f64, x: impl Fn(&Row) -> f64) -> Drawn {
+fn panel(area: &Area<'_>, x_name: &str, curves: &[Curve<'_>], measure: &Measure, x: impl Fn(&Row) -> f64) -> Drawn {
+    let noise = measure.noise;
     let rows = || curves.iter().flat_map(|c| c.rows.iter().copied());
     let width = around(rows().map(&x));
-    let height = around(rows().map(error).chain([noise]));
+    let height = around(rows().map(|row| measure.of(row)).chain([noise]));
     let mut chart = ChartBuilder::on(area)
         .margin(14)
         .x_label_area_size(48)
         .y_label_area_size(84)
-        .build_cartesian_2d(width.clone().log_scale(), height.log_scale())?;
+        .build_cartesian_2d(width.clone().log_scale().base(2.0), height.log_scale())?;
     chart
         .configure_mesh()
         .light_line_style(WHITE)
@@ -115,13 +139,13 @@ fn panel(area: &Area<'_>, x_name: &str, curves: &[Curve<'_>], noise: f64, x: imp
         .axis_desc_style(("sans-serif", 20))
         .x_labels(6)
         .x_desc(x_name)
-        .y_desc("RMSE, linear radiance")
+        .y_desc(measure.name)
         .x_label_formatter(&number)
         .y_label_formatter(&number)
         .draw()?;
     for (curve, colour) in curves.iter().zip(COLOURS.into_iter().cycle()) {
         let points: Vec<(f64, f64)> =
-            curve.rows.iter().map(|row| (x(row), error(row))).filter(|p| p.0 > 0.0 && p.1 > 0.0).collect();
+            curve.rows.iter().map(|row| (x(row), measure.of(row))).filter(|p| p.0 > 0.0 && p.1 > 0.0).collect();
         chart
             .draw_series(LineSeries::new(points.iter().copied(), colour.filled().stroke_width(3)).point_size(5))?
             .label(curve.name)

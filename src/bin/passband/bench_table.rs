@@ -54,6 +54,9 @@ pub fn text(report: &Report) -> String {
     if report.scenes.iter().any(|scene| scene.environment.is_some()) {
         parts.push(format!("A new environment in every frame would cost\n{}", gains::environments(&report.scenes)));
     }
+    if report.scenes.iter().any(|scene| !scene.rebuilt.is_empty()) {
+        parts.push(format!("An environment that is another one in every frame costs\n{}", gains::rebuilt(&report.scenes)));
+    }
     if !report.summary.is_empty() {
         parts.push(format!("Speed-up at equal error against full rate, over scenes\n{}", summary(&report.summary)));
     }

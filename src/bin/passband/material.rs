@@ -2,6 +2,7 @@
 
 use comfy_table::{Table, presets};
 use glam::DVec3;
+use passband::distribution::fit::MOST_LOBES;
 use passband::distribution::{Budget, LobeFit};
 use passband::frequency::environment::EPS;
 use passband::offline::error::{Error, Result};
@@ -33,6 +34,9 @@ pub struct Args {
     /// Plot to write (.png)
     #[arg(short, long)]
     output: Option<PathBuf>,
+    /// Report fits by at most so many lobes, too
+    #[arg(long, value_name = "N", value_delimiter = ',', value_parser = clap::value_parser!(u32).range(1..=MOST_LOBES as i64))]
+    lobes: Vec<u32>,
 }
 
 /// A reflectance to look at.
@@ -53,7 +57,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     }
     let subject = load(&args.material)?;
     let bandwidth = report(&subject)?;
-    let fit = report_fit(&subject)?;
+    let fit = report_fit(&subject, &args.lobes)?;
     if let Some(output) = &args.output {
         plot::write(output, &subject.title, subject.reflectance.as_ref(), &bandwidth, &fit)?;
         crate::print(format_args!("\nplot: {}", output.display()))?;
@@ -144,21 +148,27 @@ fn report(subject: &Subject) -> Result<LobeBandwidth> {
     Ok(bandwidth)
 }
 
-/// Returns the fit of what the GPU shades.
-fn report_fit(subject: &Subject) -> Result<LobeFit> {
-    let clock = std::time::Instant::now();
-    let fit = lobe_fit(&subject.shaded, Budget::default(), fit_cache::cache_folder().as_deref());
-    let seconds = clock.elapsed().as_secs_f64();
-    crate::print(format_args!("\nfit by {} lobes and a cosine, found or read in {seconds:.2} s:", fit.count()))?;
+/// Returns the fit of what the GPU shades; reports others by at most so many `lobes` beside it.
+fn report_fit(subject: &Subject, lobes: &[u32]) -> Result<LobeFit> {
     let mut table = Table::new();
     let degrees = ANGLES.map(|degrees| format!("{degrees}"));
-    table.load_style(presets::NOTHING).set_header(["degrees".into()].into_iter().chain(degrees).chain(["mean".into()]));
-    let seen = ANGLES.map(|degrees| fit.at(degrees.to_radians().cos()));
-    let used = seen.each_ref().map(|node| node.lobes.iter().filter(|l| l.amplitude != DVec3::ZERO).count().to_string());
-    table.add_row(["lobes".into()].into_iter().chain(used));
-    let errors = seen.map(|node| format!("{:.4}", node.error));
-    let mean = format!("{:.4}", fit.mean_error());
-    table.add_row(["missed share of the light".into()].into_iter().chain(errors).chain([mean]));
-    crate::print(table)?;
+    let header = ["degrees".into()].into_iter().chain(degrees).chain(["mean", "seconds"].map(String::from));
+    table.load_style(presets::NOTHING).set_header(header);
+    let mut found = |budget| {
+        let clock = std::time::Instant::now();
+        let fit = lobe_fit(&subject.shaded, budget, fit_cache::cache_folder().as_deref());
+        let seconds = clock.elapsed().as_secs_f64();
+        let errors = ANGLES.map(|degrees| fit.at(degrees.to_radians().cos()).error).into_iter().chain([fit.mean_error()]);
+        let numbers = errors.map(|e| format!("{e:.4}")).chain([format!("{seconds:.2}")]);
+        table.add_row([format!("{} lobes", fit.count())].into_iter().chain(numbers));
+        fit
+    };
+    let fit = found(Budget::default());
+    lobes.iter().for_each(|n| drop(found(Budget { lobes: *n as usize, ..Budget::default() })));
+    let used = |degrees: f64| fit.at(degrees.to_radians().cos()).lobes.iter().filter(|l| l.amplitude != DVec3::ZERO).count();
+    table.add_row(["lobes of the first used".into()].into_iter().chain(ANGLES.map(|degrees| used(degrees).to_string())));
+    crate::print(format_args!(
+        "\nmissed share of the light, fitted by lobes and a cosine, found or read in so many seconds:\n{table}"
+    ))?;
     Ok(fit)
 }

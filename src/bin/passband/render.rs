@@ -69,7 +69,8 @@ pub struct Args {
     #[arg(long, value_name = "PATH=VALUE", value_parser = assignment)]
     set: Vec<(String, String)>,
     /// Extra layers of an EXR: depth, normal, material, object, uv, footprint, curvature, level,
-    /// weight, shaded, samples, base (with --estimator preconvolved, cv or residual), residual (with cv or residual), lobes (with a --filter that finds some)
+    /// weight, shaded, samples, bandwidth and spread (with --rate bandwidth), base, fit-error and decision (with --estimator
+    /// preconvolved, cv or residual), residual (with cv or residual), lobes (with a --filter that finds some)
     #[arg(long, value_name = "NAME", value_delimiter = ',')]
     aov: Vec<String>,
     /// A converged full-rate image of N directions a pixel instead

@@ -32,7 +32,7 @@ pub enum Gloss {
 pub struct Case {
     /// A mesh, by the name that its scene has here.
     pub mesh: &'static str,
-    /// A built-in (synthetic) reflectance.
+    /// A built-in (synthetic) reflectance; `mirror`, GGX of alpha 0.01; or `several`, those of the scene.
     pub reflectance: &'static str,
     /// A built-in environment, or the stem of a fetched one.
     pub environment: &'static str,
@@ -42,7 +42,8 @@ pub struct Case {
 }
 
 /// Name, scene, the scene's material, and the fetched file that it needs, with the name that `scripts/fetch-assets` knows.
-const MESHES: [(&str, &str, &str, Option<[&str; 2]>); 6] = [
+const MESHES: [(&str, &str, &str, Option<[&str; 2]>); 7] = [
+    ("trio", "trio", "", None),
     ("sphere", "sphere", "paint", None),
     ("bumpy-sphere", "bumpy-sphere", "paint", None),
     ("torus-knot", "torus-knot", "paint", None),
@@ -52,6 +53,10 @@ const MESHES: [(&str, &str, &str, Option<[&str; 2]>); 6] = [
 ];
 /// Built-in environments that cases use; the others are fetched.
 const BUILTIN_ENVIRONMENTS: [&str; 2] = ["sun-sky", "studio"];
+/// Reflectances that are no tables, as scene files have them.
+const MODELS: [(&str, &str); 1] = [("mirror", "{ ggx = { alpha = 0.01, f0 = [0.95, 0.85, 0.6], albedo = 0 } }")];
+/// In the place of a reflectance, where a scene has several and keeps them.
+const SEVERAL: &str = "several";
 /// Where `scripts/fetch-assets` puts files, from the repository's root.
 const ASSETS: &str = "assets";
 
@@ -93,11 +98,36 @@ pub const JUDGED: [Case; 12] = [
     case("armadillo", "rough", "sun-sky"),
 ];
 
+/// Of the suite residual, those on which its defaults are chosen.
+pub const RESIDUAL_TUNING: [Case; 2] = [quick("torus-knot", "mirror-metal", "studio"), case("sphere", "gloss-plastic", "forest")];
+
+/// Of the suite residual, those on which they are judged: of the meshes and reflectances of each half above, and with what is hard for
+/// lobes that stand for a reflectance, which is a mirror, noise, and several materials in a frame.
+pub const RESIDUAL_JUDGED: [Case; 8] = [
+    quick("sphere", "metallic-paint", "sun-sky"),
+    quick("bumpy-sphere", "mirror-metal", "studio"),
+    quick("torus-knot", "mirror", "sun-sky"),
+    quick("torus-knot", "noisy-paint", "studio"),
+    quick("trio", SEVERAL, "studio"),
+    case("bumpy-sphere", "mirror", "city"),
+    case("bunny", "metallic-paint", "city"),
+    case("armadillo", "rough", "sun-sky"),
+];
+
 /// Every case of both halves, or those of the quick preset.
 pub fn all(quick: bool) -> Vec<(Half, Case)> {
+    halves(&TUNING, &JUDGED, quick)
+}
+
+/// The same of the suite residual.
+pub fn of_residual(quick: bool) -> Vec<(Half, Case)> {
+    halves(&RESIDUAL_TUNING, &RESIDUAL_JUDGED, quick)
+}
+
+fn halves(tuning: &[Case], judged: &[Case], quick: bool) -> Vec<(Half, Case)> {
     let half = |half: Half, cases: &[Case]| cases.iter().map(|c| (half, *c)).collect::<Vec<_>>();
-    let mut cases = half(Half::Tuning, &TUNING);
-    cases.extend(half(Half::Judged, &JUDGED));
+    let mut cases = half(Half::Tuning, tuning);
+    cases.extend(half(Half::Judged, judged));
     cases.retain(|(_, c)| c.quick || !quick);
     cases
 }
@@ -111,7 +141,7 @@ impl Case {
     /// What its reflectance is like.
     pub fn gloss(&self) -> Gloss {
         match self.reflectance {
-            "mirror-metal" => Gloss::Mirror,
+            "mirror-metal" | "mirror" => Gloss::Mirror,
             "rough" | "satin" => Gloss::Rough,
             _ => Gloss::Glossy,
         }
@@ -144,21 +174,32 @@ impl Case {
             // As a TOML literal, for backslashes.
             false => ("environment.map".to_string(), format!("'{map}'")),
         };
-        let reflectance = (format!("materials.{material}.reflectance.builtin"), self.reflectance.to_string());
+        let model = MODELS.iter().find(|(name, _)| *name == self.reflectance).map(|(_, model)| model.to_string());
+        let reflectance = match model {
+            Some(model) => Some((format!("materials.{material}.reflectance"), model)),
+            None if self.reflectance == SEVERAL => None,
+            None => Some((format!("materials.{material}.reflectance.builtin"), self.reflectance.to_string())),
+        };
+        let overrides: Vec<_> = std::iter::once(environment).chain(reflectance).collect();
         let scene = if file.is_some() { root.join(scene).to_string_lossy().into_owned() } else { scene.to_string() };
-        Ok(Ok(Scene::load(&scene, &[environment, reflectance])?))
+        Ok(Ok(Scene::load(&scene, &overrides)?))
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::reflectance::Model;
     use std::collections::BTreeSet;
 
     #[test]
     fn halves_share_no_surface_and_quick_needs_no_files() {
         let surfaces = |cases: &[Case]| cases.iter().map(|c| (c.mesh, c.reflectance)).collect::<BTreeSet<_>>();
-        assert_eq!(surfaces(&TUNING).intersection(&surfaces(&JUDGED)).count(), 0);
+        let [tuning, judged] =
+            [[&TUNING[..], &RESIDUAL_TUNING[..]], [&JUDGED[..], &RESIDUAL_JUDGED[..]]].map(|lists| surfaces(&lists.concat()));
+        assert_eq!(tuning.intersection(&judged).count(), 0);
+        let names: BTreeSet<_> = of_residual(false).iter().map(|(_, c)| c.name()).collect();
+        assert_eq!(names.len(), RESIDUAL_TUNING.len() + RESIDUAL_JUDGED.len());
         let names: BTreeSet<_> = all(false).iter().map(|(_, c)| c.name()).collect();
         assert_eq!(names.len(), TUNING.len() + JUDGED.len());
         // Each half has every mesh, every reflectance and every environment.
@@ -167,9 +208,13 @@ mod tests {
             assert_eq!([count(|c| c.mesh), count(|c| c.reflectance), count(|c| c.environment)], [6, 5, 4]);
         }
         let nowhere = Path::new("/nowhere");
-        for (_, case) in all(true) {
+        for (_, case) in all(true).into_iter().chain(of_residual(true)) {
             let world = case.scene(nowhere).unwrap().unwrap().resolve().unwrap();
-            assert_eq!((world.name.as_str(), world.objects.len()), (case.mesh, 1));
+            let count = if case.reflectance == SEVERAL { 3 } else { 1 };
+            assert_eq!((world.name.as_str(), world.objects.len(), world.materials.len()), (case.mesh, count, count));
+            if case.reflectance == "mirror" {
+                assert!(matches!(world.materials[0].model, Model::Ggx(ggx) if ggx.alpha == 0.01));
+            }
         }
         let armadillo = Case { environment: "city", ..case("armadillo", "rough", "") };
         assert_eq!(armadillo.scene(nowhere).unwrap().unwrap_err(), ["armadillo", "environments"]);

@@ -1,4 +1,4 @@
-//! The figures of Bagher et al. 2011 that show what prediction does, drawn of any scene.
+//! The figures of Bagher et al. 2011 that show what prediction does, drawn of any scene (those of residuals: `parts.rs`).
 
 use crate::frequency::operators::Combine;
 use crate::offline::aov::Aov;
@@ -35,7 +35,7 @@ const DETAILS: usize = 4;
 /// Labelled images in rows.
 #[derive(Clone, Debug)]
 pub struct Figure {
-    /// `figure-06` for figure 6.
+    /// `figure-06` for figure 6 of that paper.
     pub name: &'static str,
     /// What it shows.
     pub title: String,
@@ -58,11 +58,11 @@ pub struct Stage<'a> {
 }
 
 /// A rendered image and how far it is from the reference.
-struct Shot {
-    image: LinearImage,
+pub(super) struct Shot {
+    pub image: LinearImage,
     shaded: f64,
-    ms: f64,
-    error: Metrics,
+    pub ms: f64,
+    pub error: Metrics,
 }
 
 impl Stage<'_> {
@@ -80,16 +80,16 @@ impl Stage<'_> {
         keep(self.antialiasing()?)
     }
 
-    fn title(&self, what: &str) -> String {
+    pub(super) fn title(&self, what: &str) -> String {
         format!("{what}: {}, N = {}", self.world.name, self.base.config.directions)
     }
 
-    fn truth(&self) -> Picture {
+    pub(super) fn truth(&self) -> Picture {
         self.reference.image().picture
     }
 
     /// Of the reference.
-    fn exposure(&self) -> f64 {
+    pub(super) fn exposure(&self) -> f64 {
         let (picture, mask) = (self.truth(), self.reference.mask());
         let sum: f64 = picture.rgb.iter().map(|&c| luminance(DVec3::from(c.map(f64::from)))).sum();
         Exposure::Auto.factor(sum / mask.iter().filter(|m| **m).count().max(1) as f64)
@@ -104,7 +104,7 @@ impl Stage<'_> {
     }
 
     /// With times, and with layers `aovs`.
-    fn shot(&self, config: Config, aovs: &[Aov]) -> Result<Shot> {
+    pub(super) fn shot(&self, config: Config, aovs: &[Aov]) -> Result<Shot> {
         let Rendered { image, stats } = self.render(config, aovs, true)?;
         let frame = Frame { picture: picture(&image), coverage: image.channel("A").unwrap_or_default().to_vec() };
         let error = quality::error(&[frame], &self.truth(), &self.reference.mask())?;
@@ -258,6 +258,6 @@ impl Stage<'_> {
     }
 }
 
-fn picture(image: &LinearImage) -> Picture {
+pub(super) fn picture(image: &LinearImage) -> Picture {
     Picture { width: image.width, height: image.height, rgb: image.rgb().unwrap_or_default() }
 }

@@ -9,6 +9,7 @@ pub mod environment;
 pub mod equal;
 pub mod figures;
 pub mod judge;
+pub mod parts;
 pub mod quality;
 pub mod reached;
 pub mod reference;

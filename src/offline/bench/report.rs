@@ -93,6 +93,9 @@ pub struct SceneReport {
     pub extent: [u32; 2],
     /// What a new environment costs; absent in suites without errors and in scenes without one.
     pub environment: Option<EnvironmentTimes>,
+    /// What an environment costs that is pre-convolved in every frame, at its size and at half of that; of the suite residual, at the
+    /// first scene with a map of that size.
+    pub rebuilt: Vec<EnvironmentTimes>,
     /// Error of reconstruction alone over shaded samples; empty unless it is asked for, in suites with errors.
     pub curves: Vec<Curve>,
     /// What errors are against; absent in suites without errors.

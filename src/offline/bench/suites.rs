@@ -1,18 +1,20 @@
 //! The suites: which variants, in which scenes.
 
 use crate::offline::bench::cases::{self, Case, Half};
+use crate::offline::bench::environment::{self, EnvironmentTimes, Rebuilt, halved};
 use crate::offline::bench::figures::{self, Figure};
 use crate::offline::bench::quality::Frame;
 use crate::offline::bench::reference::Converged;
 use crate::offline::bench::report::{Head, Report, Row, SceneReport, Seconds, Skipped, gains};
 use crate::offline::bench::runner::Runner;
 use crate::offline::bench::variants::{self, Family};
-use crate::offline::bench::{curves, environment, judge, reached, table};
+use crate::offline::bench::{curves, judge, reached, table};
 use crate::offline::error::Result;
 use crate::offline::headless::Options;
 use crate::offline::render::Settings;
 use crate::offline::scene::Scene;
 use crate::offline::world::World;
+use crate::sampling::LatLong;
 use std::path::PathBuf;
 use std::time::Instant;
 
@@ -136,7 +138,7 @@ pub fn run(order: &Order, keep: Option<&mut Keep<'_>>, progress: &mut Progress<'
         targets: Vec::new(),
         seconds: Seconds::default(),
     };
-    let mut run = Run { order, report: &mut report, keep, progress };
+    let mut run = Run { order, report: &mut report, keep, progress, known: Vec::new() };
     let default = matches!(order.suite, Suite::Passes).then(|| {
         let count = if order.preset == Preset::Quick { 1 } else { PASSES_SCENES.len() };
         PASSES_SCENES.iter().take(count).map(|name| name.to_string()).collect::<Vec<_>>()
@@ -146,7 +148,9 @@ pub fn run(order: &Order, keep: Option<&mut Keep<'_>>, progress: &mut Progress<'
         let scenes: Vec<Scene> = names.iter().map(|name| Scene::load(name, &[])).collect::<Result<_>>()?;
         scenes.iter().try_for_each(|scene| run.scene(None, scene.name(), scene, true))?;
     } else {
-        for (half, case) in cases::all(order.preset == Preset::Quick) {
+        let quick = order.preset == Preset::Quick;
+        let cases = if order.suite == Suite::Residual { cases::of_residual(quick) } else { cases::all(quick) };
+        for (half, case) in cases {
             match case.scene(&order.root)? {
                 Ok(scene) => run.scene(Some((half, case)), &case.name(), &scene, case.quick)?,
                 Err(needs) => run.report.skipped.push(Skipped { scene: case.name(), needs }),
@@ -172,6 +176,8 @@ struct Run<'a, 'k, 'p> {
     report: &'a mut Report,
     keep: Option<&'a mut Keep<'k>>,
     progress: &'a mut Progress<'p>,
+    /// Sizes of environments whose cost is known.
+    known: Vec<[u32; 2]>,
 }
 
 impl Run<'_, '_, '_> {
@@ -189,6 +195,7 @@ impl Run<'_, '_, '_> {
             case: case.map(|c| c.1),
             extent,
             environment: None,
+            rebuilt: Vec::new(),
             curves: Vec::new(),
             reference: None,
             variants: Vec::new(),
@@ -197,21 +204,40 @@ impl Run<'_, '_, '_> {
         if order.suite.error_frames() > 0 {
             let reference = self.judge(&world, &base, &frames, &mut found)?;
             let told = |progress: &mut Progress<'_>, what| progress(&format!("{name}: {what}"), 0, 1);
-            if order.curves {
+            if order.curves && order.suite == Suite::Bagher {
                 told(self.progress, "curves");
                 found.curves = curves::of(&world, &base)?;
             }
             if let (Some(light), Suite::Bagher) = (&world.environment, order.suite) {
-                found.environment = Some(environment::times(&light.map, &base, self.report.head.rounds)?);
+                found.environment = Some(environment::times(&light.map, &base, self.report.head.rounds, Rebuilt::Bandwidth)?);
             }
-            if let (Some(keep), Suite::Bagher) = (self.keep.as_mut().filter(|_| pictured), order.suite) {
+            if let (Some(light), Suite::Residual) = (&world.environment, order.suite) {
+                told(self.progress, "environment");
+                found.rebuilt = self.rebuilt(&light.map, &base)?;
+            }
+            if let Some(keep) = self.keep.as_mut().filter(|_| pictured) {
                 told(self.progress, "figures");
                 let stage = figures::Stage { world: &world, base: &base, reference: &reference, found: &found };
-                stage.draw(&mut |figure| keep(name, figure))?;
+                match order.suite {
+                    Suite::Residual => keep(name, stage.parts()?)?,
+                    Suite::Passes | Suite::Bagher => stage.draw(&mut |figure| keep(name, figure))?,
+                }
             }
         }
         self.report.scenes.push(found);
         Ok(())
+    }
+
+    /// What `map` costs pre-convolved in every frame, and at half of its size; nothing for a size that is known.
+    fn rebuilt(&mut self, map: &LatLong, base: &Settings) -> Result<Vec<EnvironmentTimes>> {
+        let size = [map.width(), map.height()];
+        if self.known.contains(&size) {
+            return Ok(Vec::new());
+        }
+        self.known.push(size);
+        let rounds = self.report.head.rounds;
+        let sizes = std::iter::once(map.clone()).chain(halved(map)?);
+        sizes.map(|map| environment::times(&map, base, rounds, Rebuilt::Prefilter)).collect()
     }
 
     /// Times all variants into `found`; the images for errors.

@@ -2,6 +2,8 @@
 
 use crate::offline::image_io::LinearImage;
 use crate::offline::metrics::{FlipMap, Picture, encode};
+use crate::sampling::luminance;
+use glam::DVec3;
 
 /// Where nothing is known or seen.
 const NOTHING: [u8; 3] = [120, 120, 120];
@@ -10,6 +12,8 @@ const LEVELS: [[u8; 3]; 8] =
     [[255, 255, 255], [255, 225, 90], [240, 120, 50], [190, 50, 80], [110, 50, 140], [50, 80, 170], [40, 60, 110], [20, 30, 60]];
 /// Those that frames have by default, in words.
 pub const KEY: &str = "-2 white, -1 yellow, 0 orange, 1 red, 2 violet, 3 blue";
+/// What is done at a pixel about what lobes miss, in words.
+pub const DECISIONS: &str = "black: nothing, white: up-sampled\nshaded for a pixel orange, 2x2 red, 4x4 violet, 8x8 blue";
 /// Level of the first colour.
 const FINEST: f32 = -2.0;
 /// What small differences are multiplied with.
@@ -94,6 +98,30 @@ pub fn levels(label: String, image: &LinearImage) -> Tile {
     Tile::of(label, image, layers[0].iter().zip(layers[1]).map(colour))
 }
 
+/// The layer `decision`: [`DECISIONS`]; grey where nothing is seen.
+pub fn decisions(label: String, image: &LinearImage) -> Tile {
+    let layer = image.channel("decision.Y").unwrap_or_default();
+    let colour = |decision: &f32| match *decision as i32 {
+        ..0 => NOTHING,
+        0 => [0; 3],
+        1 => [255; 3],
+        // Two levels below a pixel's are the first colour, two codes above nothing the first level.
+        level => LEVELS.get(level as usize).copied().unwrap_or(LEVELS[7]),
+    };
+    Tile::of(label, image, layer.iter().map(colour))
+}
+
+/// By how much the luminance of `a` is above that of `b` as displayed, from `-most` (blue) over 0 (black) to `most` (orange).
+pub fn signed(label: String, [a, b]: [&Picture; 2], exposure: f64, most: f64) -> Tile {
+    let shown = |rgb: &[f32; 3]| encode((exposure * luminance(DVec3::from(rgb.map(f64::from)))).max(0.0));
+    let colour = |(a, b): (&[f32; 3], &[f32; 3])| {
+        let along = ((shown(a) - shown(b)) / most).clamp(-1.0, 1.0);
+        let end = if along < 0.0 { [0.35, 0.65, 1.0] } else { [1.0, 0.6, 0.2] };
+        end.map(|c| byte(c * along.abs().sqrt()))
+    };
+    Tile { label, width: a.width, height: a.height, rgb: a.rgb.iter().zip(&b.rgb).map(colour).collect() }
+}
+
 /// White where a layer is above 0; grey where nothing is seen.
 pub fn mask(label: String, image: &LinearImage, channel: &str) -> Tile {
     let layers = [image.channel(channel), image.channel("A")].map(Option::unwrap_or_default);
@@ -135,6 +163,18 @@ mod tests {
         assert!(hot[2] == NOTHING && sum(0) < 20 && sum(0) < sum(3) && sum(3) < sum(1), "{hot:?}");
         assert_eq!(covered_median(&layers(&[("level.Y", &[3.0; 4])]), "level.Y", &image, 1.5), Some(1.5));
         assert_eq!(covered_median(&image, "level.Y", &layers(&[]), 0.0), None);
+    }
+
+    #[test]
+    fn decisions_have_a_colour_each_and_differences_a_sign() {
+        let image = layers(&[("decision.Y", &[-1.0, 0.0, 1.0, 5.0])]);
+        assert_eq!(decisions(String::new(), &image).rgb, [NOTHING, [0; 3], [255; 3], LEVELS[5]]);
+        let grey = |v: [f32; 4]| Picture { width: 2, height: 2, rgb: v.iter().map(|v| [*v; 3]).collect() };
+        let (a, b) = (grey([0.5, 0.1, 0.5, 0.5]), grey([0.5, 0.5, 0.1, 0.45]));
+        let tile = signed(String::new(), [&a, &b], 1.0, 0.2);
+        let [same, less, more, some] = tile.rgb[..] else { panic!("{tile:?}") };
+        assert!(same == [0; 3] && less[2] == 255 && less[0] < less[2] && more[0] == 255 && more[2] < more[0], "{tile:?}");
+        assert!(some[0] > 0 && some[0] < 255, "{some:?}");
     }
 
     #[test]

@@ -85,24 +85,22 @@ pub const BAGHER: &[Family] = &[
 
 /// Light that is looked up, and what of it is estimated, beside full rate.
 pub const RESIDUAL: &[Family] = &[
-    Family { directions: &[64, 16, 256], more: &[4, 1024], ..FULL },
+    Family { directions: &[64, 16, 256], more: &[4], ..FULL },
     Family { name: "base", estimator: Estimator::Preconvolved, directions: &[1], ..FULL },
     Family { name: "cv", estimator: Estimator::Cv, directions: &[16], more: &[4, 64], ..FULL },
     Family { name: "residual", estimator: Estimator::Residual, directions: &[16, 64], more: &[256], ..BANDWIDTH },
-    Family { name: "full brdf-random", estimator: Estimator::BrdfRandom, directions: &[64], more: &[256], ..FULL },
+    Family { name: "full brdf-random", estimator: Estimator::BrdfRandom, directions: &[64], ..FULL },
     Family { name: "bandwidth", directions: &[64], more: &[16, 256], ..BANDWIDTH },
-    Family {
-        name: "base lobes=8",
-        part: Part::Setting,
-        estimator: Estimator::Preconvolved,
-        change: |c| c.fit_lobes = 8,
-        directions: &[],
-        more: &[1],
-        ..FULL
-    },
-    further_residual("residual everywhere", |c| c.residual_errors = [0.0; 3]),
-    further_residual("residual coarser", |c| c.residual_errors = [0.0, 0.2, 0.5]),
+    base("base lobes=4", |c| c.fit_lobes = 4),
+    base("base lobes=8", |c| c.fit_lobes = 8),
+    further_residual("residual above .05", |c| c.residual_errors = [0.05, 0.1, 0.25]),
+    further_residual("residual above .2", |c| c.residual_errors = [0.2, 0.2, 0.25]),
 ];
+
+/// Another fit than the default, in the full preset.
+const fn base(name: &'static str, change: fn(&mut Config)) -> Family {
+    Family { rate: Rate::Full, estimator: Estimator::Preconvolved, more: &[1], ..further(name, change) }
+}
 
 const fn further_residual(name: &'static str, change: fn(&mut Config)) -> Family {
     Family { estimator: Estimator::Residual, ..further(name, change) }

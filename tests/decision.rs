@@ -1,0 +1,163 @@
+//! What residuals are said to do is what the device does, by the errors that fits have.
+#![cfg(feature = "offline")]
+
+mod support {
+    pub mod frames;
+}
+
+use glam::{DVec2, DVec3};
+use passband::distribution::{Budget, LobeFit};
+use passband::offline::aov::Aov;
+use passband::offline::builtin;
+use passband::offline::headless::Options;
+use passband::offline::image_io::LinearImage;
+use passband::offline::reference::MIN_COSINE;
+use passband::offline::render::{Settings, render};
+use passband::offline::world::World;
+use passband::{Config, Estimator, Filter, Light, Rate};
+use std::sync::OnceLock;
+use support::frames::{config, table, world};
+
+const EXTENT: [u32; 2] = [96, 72];
+
+fn scene() -> World {
+    world("sphere", 64, table("metallic-paint"), builtin::environment("studio", 128).unwrap())
+}
+
+/// A fit by so few lobes that it misses something everywhere.
+fn residual(rate: Rate) -> Config {
+    Config { rate, fit_lobes: 8, lmax: 3, residual_errors: [0.0, 0.1, 0.25], ..config(EXTENT, Estimator::Residual, 16) }
+}
+
+fn fit() -> &'static LobeFit {
+    static FIT: OnceLock<LobeFit> = OnceLock::new();
+    FIT.get_or_init(|| LobeFit::build(&table("metallic-paint"), Budget { lobes: 8, ..Budget::default() }))
+}
+
+fn layers(world: &World, config: Config, aovs: &[Aov]) -> LinearImage {
+    let device = Options { device: Some("llvmpipe".into()), validate: true };
+    let settings = Settings { aovs: aovs.to_vec(), device, ..Settings::new(config) };
+    let rendered = render(world, &settings, &mut |_, _| {}).unwrap();
+    assert_eq!(rendered.stats.validation_messages, [""; 0]);
+    rendered.image
+}
+
+fn layer<'a>(image: &'a LinearImage, name: &str) -> &'a [f32] {
+    image.channel(name).unwrap_or_else(|| panic!("no {name}"))
+}
+
+/// The `share` quantile of errors over covered pixels.
+fn quantile(image: &LinearImage, share: f64) -> f32 {
+    let pixels = layer(image, "fit-error.Y").iter().zip(layer(image, "A"));
+    let mut errors: Vec<f32> = pixels.filter(|(_, a)| **a > 0.0).map(|(e, _)| *e).collect();
+    errors.sort_by(f32::total_cmp);
+    errors[(share * errors.len() as f64) as usize]
+}
+
+#[test]
+fn errors_are_those_of_the_fit_at_the_view_angle() {
+    let world = scene();
+    for estimator in [Estimator::Preconvolved, Estimator::Cv, Estimator::Residual] {
+        let config = Config { estimator, ..residual(Rate::Full) };
+        let image = layers(&world, config, &[Aov::FitError, Aov::Normal]);
+        let normal = ["X", "Y", "Z"].map(|c| layer(&image, &format!("normal.{c}")));
+        let mut covered = 0;
+        for (i, (found, alpha)) in layer(&image, "fit-error.Y").iter().zip(layer(&image, "A")).enumerate() {
+            if *alpha == 0.0 {
+                assert_eq!(*found, 0.0);
+                continue;
+            }
+            let pixel = DVec2::new((i % 96) as f64 + 0.5, (i / 96) as f64 + 0.5);
+            let cosine = DVec3::from(normal.map(|n| n[i].into())).dot(-world.camera.ray(pixel, EXTENT));
+            let expected = fit().at(cosine.max(MIN_COSINE)).error;
+            // Angles of normals in 32 bits: errors rise by less than 10 a radian.
+            assert!((f64::from(*found) - expected).abs() < 1e-4 * (1.0 + expected), "{i}: {found} for {expected}");
+            covered += 1;
+        }
+        assert!(covered > 1000);
+    }
+    // What the filter finds stands for the material, and nobody knows how well.
+    let mut normals = scene();
+    normals.materials[0].model = support::frames::ggx(0.2, DVec3::ONE, DVec3::ZERO);
+    let image = layers(&normals, Config { filter: Filter::Tk, ..residual(Rate::Full) }, &[Aov::FitError]);
+    assert_eq!(layer(&image, "fit-error.Y"), layer(&image, "A"));
+}
+
+#[test]
+fn what_is_left_out_has_a_factor_of_one_and_nothing_else_has() {
+    let world = scene();
+    let plain = layers(&world, residual(Rate::Full), &[Aov::FitError, Aov::Decision]);
+    // Something is estimated at every sample, for itself.
+    assert!(layer(&plain, "decision.Y").iter().zip(layer(&plain, "A")).all(|(d, a)| *d == if *a > 0.0 { 2.0 } else { -1.0 }));
+    let negligible = quantile(&plain, 0.5);
+    let errors = [negligible, 1.0, 2.0];
+    let image = layers(&world, Config { residual_errors: errors, ..residual(Rate::Full) }, &[Aov::Decision, Aov::Residual]);
+    let factor = ["R", "G", "B"].map(|c| layer(&image, &format!("residual.{c}")));
+    let (mut left_out, mut estimated) = (0, 0);
+    for (i, decision) in layer(&image, "decision.Y").iter().enumerate() {
+        // Rounding decides where an error is that of the limit.
+        if (layer(&plain, "fit-error.Y")[i] - negligible).abs() < 1e-4 {
+            continue;
+        }
+        let one = factor.iter().all(|f| f[i] == 1.0);
+        match decision {
+            0.0 => assert!(one, "{i}"),
+            2.0 => assert!(!one, "{i}"),
+            _ => assert_eq!((*decision, layer(&image, "A")[i]), (-1.0, 0.0)),
+        }
+        left_out += usize::from(*decision == 0.0);
+        estimated += usize::from(*decision == 2.0);
+    }
+    assert!(left_out > 500 && estimated > 500, "{left_out} {estimated}");
+}
+
+#[test]
+fn levels_follow_from_errors() {
+    let world = scene();
+    let plain = layers(&world, residual(Rate::Full), &[Aov::FitError]);
+    let errors = [0.1, 0.6, 0.8].map(|share| quantile(&plain, share));
+    let config = Config { residual_errors: errors, ..residual(Rate::Bandwidth) };
+    let image = layers(&world, config, &[Aov::FitError, Aov::Decision, Aov::Shaded, Aov::Level]);
+    let mut counts = [0; 8];
+    for (i, (decision, error)) in layer(&image, "decision.Y").iter().zip(layer(&image, "fit-error.Y")).enumerate() {
+        let (shaded, level) = (layer(&image, "shaded.Y")[i], layer(&image, "level.Y")[i]);
+        if *decision < 0.0 || errors.iter().any(|e| (e - error).abs() < 1e-4) {
+            continue;
+        }
+        counts[*decision as usize] += 1;
+        assert_eq!(*decision == 0.0, *error <= errors[0], "{i}");
+        if *decision >= 1.0 {
+            assert_eq!(*decision > 1.0, shaded == 1.0, "{i}");
+        }
+        // Beyond the last limit every sample is shaded for itself.
+        if *error > errors[2] {
+            assert_eq!((*decision, level), (2.0, 0.0), "{i}");
+        } else if *error > errors[1] {
+            assert!(*decision <= 3.0, "{i}: {decision}");
+        }
+    }
+    let [nothing, up_sampled, full, half, coarser @ ..] = counts;
+    let enough = nothing > 200 && up_sampled > 400 && full > 400 && half > 50 && coarser.iter().sum::<i32>() > 10;
+    assert!(enough, "{counts:?}");
+
+    let others = [(Estimator::Preconvolved, 0.0), (Estimator::Cv, 2.0)];
+    for (estimator, expected) in others {
+        let image = layers(&world, Config { estimator, ..residual(Rate::Full) }, &[Aov::Decision]);
+        let pixels = layer(&image, "decision.Y").iter().zip(layer(&image, "A"));
+        assert!(pixels.into_iter().all(|(d, a)| *d == if *a > 0.0 { expected } else { -1.0 }), "{estimator:?}");
+    }
+}
+
+#[test]
+fn area_lights_are_not_left_out() {
+    let mut world = scene();
+    world.environment.as_mut().unwrap().intensity = 0.2;
+    world.lights.push(Light::Sphere { position: [1.5, 2.5, 2.0], radius: 0.4, radiance: [30.0; 3] });
+    let all = Config { residual_errors: [2.0; 3], ..residual(Rate::Full) };
+    let image = layers(&world, all, &[Aov::Decision]);
+    let alone = layers(&world, Config { estimator: Estimator::Mis, directions: 256, ..residual(Rate::Full) }, &[]);
+    let sum = |image: &LinearImage| layer(image, "G").iter().map(|v| f64::from(*v)).sum::<f64>();
+    let ratio = sum(&image) / sum(&alone);
+    assert!((ratio - 1.0).abs() < 0.02, "{ratio}");
+    assert!(layer(&image, "decision.Y").iter().zip(layer(&image, "A")).all(|(d, a)| *d == if *a > 0.0 { 2.0 } else { -1.0 }));
+}
