@@ -9,6 +9,7 @@ mod cache;
 pub mod environment;
 pub mod error;
 pub mod fit_cache;
+pub mod gaussians_cache;
 pub mod gltf;
 pub mod headless;
 pub mod image_io;
