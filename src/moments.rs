@@ -154,7 +154,7 @@ pub(crate) fn clusters(material: &Material, base: &Base, filter: Filter) -> Opti
 pub(crate) fn gaussians(material: &Material, base: &Base, size: [u32; 2], filter: Filter) -> Option<Arc<Gaussians>> {
     let fit = filter.gaussians().filter(|_| !base.lobes().is_empty())?;
     let map = BrdfMap::of(material, size, Rule::Exact).ok()?;
-    let known = material.gaussians.clone().filter(|known| known.are_of(&map, fit));
+    let known = material.gaussians.clone().filter(|known| known.are_of(&map) && known.fit() == fit);
     Some(known.unwrap_or_else(|| Arc::new(Gaussians::of(&map, Parameter::of(&material.model).area(), fit))))
 }
 
@@ -181,7 +181,7 @@ impl Moments {
         let base = Base::of(material, rule)?;
         let size = base.size(material);
         let keep = |material: &Material, filter, rule| {
-            let gaussians = || material.gaussians.clone().map_or(Known::Nothing, Known::Gaussians);
+            let gaussians = || gaussians(material, &base, size, filter).map_or(Known::Nothing, Known::Gaussians);
             let known = clusters(material, &base, filter).map_or_else(gaussians, Known::Clusters);
             let area = Parameter::of(&material.model).area();
             Some(Filtered::keeping(filter, BrdfMap::of(material, size, rule).ok()?, literal, known, area)?.divided(division))

@@ -113,7 +113,8 @@ impl Samples {
             let column = ((corner[0] + x) * w as f64 / f64::from(size[0])) as usize;
             let row = ((corner[1] + y) * h as f64 / f64::from(size[1])) as usize;
             let share = 1.0 / LOOKED_AT as f64;
-            found.extend(self.texel(row.min(h - 1) * w + column.min(w - 1)).iter().map(|s| Sample { mass: s.mass * share, ..*s }));
+            found
+                .extend(self.texel(row.min(h - 1) * w + column.min(w - 1)).iter().map(|s| Sample { mass: s.mass * share, ..*s }));
         }
         found
     }
@@ -228,7 +229,9 @@ impl Above<'_> {
 
     /// The texel above texel `i`.
     fn parent(&self, size: [u32; 2], i: usize) -> Fitted {
-        let at = |c: usize, axis: usize| ((2 * c + 1) * self.size[axis] as usize / (2 * size[axis] as usize)).min(self.size[axis] as usize - 1);
+        let at = |c: usize, axis: usize| {
+            ((2 * c + 1) * self.size[axis] as usize / (2 * size[axis] as usize)).min(self.size[axis] as usize - 1)
+        };
         let [x, y] = [at(i % size[0] as usize, 0), at(i / size[0] as usize, 1)];
         let none = Fitted { sums: Sums::ZERO, normals: [DVec2::ZERO; GAUSSIANS] };
         self.fitted.get(y * self.size[0] as usize + x).copied().unwrap_or(none)

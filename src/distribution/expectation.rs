@@ -272,7 +272,10 @@ mod tests {
         // The tall heap on the left has its shape.
         let left = sums.0.iter().find(|m| m[1] < -0.3 * m[0]).unwrap();
         let [xx, yy] = [left[3] / left[0] - (left[1] / left[0]).powi(2), left[5] / left[0] - (left[2] / left[0]).powi(2)];
-        assert!((xx - 1e-3 - 0.02f64.powi(2) / 12.0).abs() < 1e-5 && (yy - 1e-3 - 0.08f64.powi(2) / 12.0).abs() < 3e-5, "{left:?}");
+        assert!(
+            (xx - 1e-3 - 0.02f64.powi(2) / 12.0).abs() < 1e-5 && (yy - 1e-3 - 0.08f64.powi(2) / 12.0).abs() < 3e-5,
+            "{left:?}"
+        );
     }
 
     #[test]

@@ -74,14 +74,15 @@ impl<'a> Filtered<'a> {
         Self::over(filter, Cow::Borrowed(map), literal, known, |kappa| vmf::mean_cosine(kappa).max(LEAST_PROJECTED_AREA))
     }
 
+    /// `map` with mixtures of it. `None` if they are of another size.
+    pub fn of_gaussians(map: &'a BrdfMap, known: Gaussians) -> Option<Self> {
+        let area: Area = |kappa| vmf::mean_cosine(kappa).max(LEAST_PROJECTED_AREA);
+        let all = known.are_of(map).then(|| Known::Gaussians(Arc::new(known)))?;
+        Self::over(Filter::Gmm, Cow::Borrowed(map), false, all, area)
+    }
+
     /// The same, which keeps the map, with its clusters if the filter has some, or its mixtures if these are known.
-    pub(crate) fn keeping(
-        filter: Filter,
-        map: BrdfMap,
-        literal: bool,
-        known: Known,
-        area: Area,
-    ) -> Option<Filtered<'static>> {
+    pub(crate) fn keeping(filter: Filter, map: BrdfMap, literal: bool, known: Known, area: Area) -> Option<Filtered<'static>> {
         Filtered::over(filter, Cow::Owned(map), literal, known, area)
     }
 
@@ -92,7 +93,7 @@ impl<'a> Filtered<'a> {
         let kept = match (storage, known) {
             (Storage::Clusters, Known::Clusters(clusters)) => Kept::Clusters(clusters),
             (Storage::Clusters, _) => return None,
-            (Storage::Gaussians(fit), Known::Gaussians(known)) if known.are_of(&map, fit) => Kept::Gaussians(known),
+            (Storage::Gaussians(_), Known::Gaussians(known)) if known.are_of(&map) => Kept::Gaussians(known),
             (Storage::Gaussians(fit), _) => Kept::Gaussians(Arc::new(Gaussians::of(&map, area, fit))),
             (Storage::Peaks(count), _) => Kept::Peaks(Peaks::of(&map, count, area)),
             (Storage::Base, _) => Kept::Base,

@@ -11,8 +11,9 @@ use crate::distribution::brdf_map::BrdfMap;
 use crate::distribution::clusters::{Decoded, Placed};
 use crate::distribution::expectation::GAUSSIANS;
 use crate::distribution::filtered::Area;
-use crate::distribution::vmf::Lobe;
+use crate::distribution::vmf::{self, Lobe};
 use crate::distribution::{elliptic, stereographic};
+use crate::reflectance::vmf::LEAST_PROJECTED_AREA;
 use glam::{DVec2, DVec3};
 
 /// Numbers of a Gaussian in a texel: mass; mass times place in the plane from the map's middle, x and y; mass times the mean square of
@@ -81,6 +82,11 @@ impl Frame {
 }
 
 impl Gaussians {
+    /// Of a map of vMF lobes, on so many threads.
+    pub fn new(map: &BrdfMap, fit: Fit, threads: usize) -> Self {
+        Self::on(map, |kappa| vmf::mean_cosine(kappa).max(LEAST_PROJECTED_AREA), fit, threads)
+    }
+
     /// Of a map whose lobes have the masses weight over `area` of concentration. The same on any number of processors, all of which it
     /// takes.
     pub(crate) fn of(map: &BrdfMap, area: Area, fit: Fit) -> Self {
@@ -123,9 +129,14 @@ impl Gaussians {
         self.size
     }
 
-    /// Whether they are those of a map of this size, and so fitted.
-    pub(crate) fn are_of(&self, map: &BrdfMap, fit: Fit) -> bool {
-        self.fit == fit && self.size == map.size() && self.labels.len() == map.lobes().len()
+    /// How they were fitted.
+    pub fn fit(&self) -> Fit {
+        self.fit
+    }
+
+    /// Whether they may be those of a map: of its size, with as many lobes.
+    pub(crate) fn are_of(&self, map: &BrdfMap) -> bool {
+        self.size == map.size() && self.labels.len() == map.lobes().len()
     }
 
     /// Of each lobe of the map, texel by texel, which Gaussian it is.

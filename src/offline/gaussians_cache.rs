@@ -124,7 +124,9 @@ mod tests {
         }
         // Other maps and other fits have other names.
         let names = [(0, Parameter::Alpha, Fit::ALIGNED), (1, Parameter::Alpha, Fit::ALIGNED), (0, Parameter::Ggx, Fit::ALIGNED)];
-        let names = names.into_iter().chain([(0, Parameter::Alpha, Fit::ALONE), (0, Parameter::Alpha, Fit { strength: 0.0, ..Fit::ALIGNED })]);
+        let names = names
+            .into_iter()
+            .chain([(0, Parameter::Alpha, Fit::ALONE), (0, Parameter::Alpha, Fit { strength: 0.0, ..Fit::ALIGNED })]);
         let names: std::collections::BTreeSet<_> = names.map(|(from, parameter, fit)| name(&map(from), parameter, fit)).collect();
         assert_eq!(names.len(), 5);
     }

@@ -3,10 +3,10 @@
 
 use crate::distribution::effective::Rule;
 use crate::distribution::expectation::GAUSSIANS;
+use crate::distribution::filtered::Area;
 use crate::distribution::gaussians::MOMENTS;
 use crate::distribution::peaks::Peaks;
 use crate::distribution::{BrdfMap, Clusters, Filter, Gaussians};
-use crate::distribution::filtered::Area;
 use crate::gpu::image::ImageDesc;
 use crate::material::Material;
 use crate::moments::{self, Base, Parameter};
@@ -107,7 +107,8 @@ impl Mixtures {
     pub fn of(materials: &[Material], bases: &[Option<Base>], sizes: &[Option<[u32; 2]>], filter: Filter) -> Vec<Option<Self>> {
         let mut found: Vec<Option<Self>> = Vec::new();
         for (i, ((material, base), size)) in materials.iter().zip(bases).zip(sizes).enumerate() {
-            let same = |k: &usize| bases.get(*k) == Some(base) && sizes.get(*k) == Some(size) && same_maps(&materials[*k], material);
+            let same =
+                |k: &usize| bases.get(*k) == Some(base) && sizes.get(*k) == Some(size) && same_maps(&materials[*k], material);
             let known = (0..i).find(same).and_then(|k| found.get(k)?.as_ref()).map(|known| known.all.clone());
             let own = |base: &Base, size: [u32; 2]| {
                 let all = known.or_else(|| moments::gaussians(material, base, size, filter))?;

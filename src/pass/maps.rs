@@ -279,9 +279,11 @@ impl MapsUpload {
         let divided = if camera { divided(materials, &bases, &places, &groups, classes.len())? } else { Vec::new() };
         let (mut uses, mut found) = (Uses::default(), Vec::new());
         let mut records = Vec::with_capacity(materials.len());
-        let shared = table.of.iter().zip(&mixtures).map(|([first, count], mixtures)| {
-            mixtures.as_ref().map_or([*first, *count, 0, 0], Mixtures::shared)
-        });
+        let shared = table
+            .of
+            .iter()
+            .zip(&mixtures)
+            .map(|([first, count], mixtures)| mixtures.as_ref().map_or([*first, *count, 0, 0], Mixtures::shared));
         for ((((material, slots), base), place), shared) in materials.iter().zip(slots).zip(bases).zip(&places).zip(shared) {
             let (moments, cells) = (place.map(|p| p.moments.0), place.and_then(|p| p.cells.map(|c| c.0)));
             let mut slots = [slots.albedo, slots.specular, slots.normal, slots.roughness, moments, cells];
