@@ -2,8 +2,9 @@
 //! come from the texel above, from the coarsest level on, so that components of one number are alike wherever texels are averaged.
 
 use crate::distribution::BrdfMap;
+use crate::distribution::clustering::{clustered, divided};
 use crate::distribution::clusters::Placed;
-use crate::distribution::expectation::{Components, GAUSSIANS, Prior, Sample, Sums, clustered, fit};
+use crate::distribution::expectation::{Components, GAUSSIANS, Prior, Sample, Sums, fit};
 use crate::distribution::filtered::Area;
 use crate::distribution::stereographic;
 use crate::distribution::stored::covered;
@@ -17,6 +18,10 @@ const ROUNDS: [usize; 2] = [8, 24];
 
 /// Texels of the map that are looked at below one: all of them count once it is fitted.
 const LOOKED_AT: usize = 1024;
+
+/// A component that has nothing of a texel has some of another's, if there are as many lobes below, and if that raises the mean
+/// logarithm of their likelihood by this.
+const WORTH_DIVIDING: (usize, f64) = (16, 0.3);
 
 /// Starts of the coarsest texel.
 const STARTS: u32 = 4;
@@ -166,7 +171,17 @@ impl Samples {
     fn level(&self, how: Fit, size: [u32; 2], level: u32, above: Option<&Above<'_>>, threads: usize) -> Vec<Fitted> {
         let count = size[0] as usize * size[1] as usize;
         let fitted = |i: usize, start: &Sums, prior: &Prior, rounds: usize| {
-            let (components, _) = fit(start, &self.looked_at(size, i), prior, rounds);
+            let lobes = self.looked_at(size, i);
+            let (mut components, mut likelihood) = fit(start, &lobes, prior, rounds);
+            while lobes.len() >= WORTH_DIVIDING.0 {
+                let found = components.moments(lobes.iter()).0;
+                let Some(start) = divided(&found, &components, &lobes) else { break };
+                let (other, of_other) = fit(&start, &lobes, prior, rounds);
+                if of_other < likelihood + WORTH_DIVIDING.1 {
+                    break;
+                }
+                (components, likelihood) = (other, of_other);
+            }
             self.moments(size, i, &components)
         };
         let alone = |i: usize| {

@@ -4,24 +4,23 @@
 //! mixture hierarchies"), so that components part by roughness, too.
 
 use crate::distribution::clusters::Placed;
-use crate::sampling::sobol;
 use glam::DVec2;
 use std::ops::{Add, Mul};
 
 /// Components of a texel.
 pub const GAUSSIANS: usize = 4;
 
-/// As how many samples a lobe counts where it is shared out: of more, components overlap less.
+/// As how many samples a lobe counts where it is shared out: of more, components overlap less. Of one in the first rounds, in which
+/// components that have little of a texel find what they can have of it.
 const SAMPLES_A_LOBE: f64 = 4.0;
+/// These rounds.
+const SOFT_ROUNDS: usize = 2;
 
 /// Components of less of a texel's mass than this are none.
 const LEAST_SHARE: f64 = 1e-9;
 
 /// The likelihood of a lobe, in logarithms, that ends a fit if it changes by less from one round to the next.
 const SETTLED: f64 = 1e-4;
-
-/// Rounds of clustering, from which components start.
-const CLUSTERING: usize = 8;
 
 /// A lobe of some mass in the plane.
 #[derive(Clone, Copy, Debug)]
@@ -62,7 +61,11 @@ struct Component {
 
 /// Those of a texel.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Components([Component; GAUSSIANS]);
+pub(super) struct Components {
+    all: [Component; GAUSSIANS],
+    /// As how many samples a lobe counts.
+    samples: f64,
+}
 
 impl Sums {
     pub const ZERO: Self = Self([[0.0; 6]; GAUSSIANS]);
@@ -113,6 +116,11 @@ impl Prior {
 impl Components {
     /// The most probable components of these moments.
     pub fn of(sums: &Sums, prior: &Prior) -> Self {
+        Self::counting(sums, prior, SAMPLES_A_LOBE)
+    }
+
+    /// The same for lobes that count as so many samples.
+    fn counting(sums: &Sums, prior: &Prior, samples: f64) -> Self {
         let total = sums.mass();
         let part = |i: usize| {
             let [q, x, y, xx, xy, yy] = sums.0[i];
@@ -133,10 +141,10 @@ impl Components {
             let most = 0.999 * (xx * yy).sqrt();
             let xy = (xy + moved.x * moved.y).clamp(-most, most);
             let determinant = xx * yy - xy * xy;
-            let log = (q / total).ln() - 0.5 * SAMPLES_A_LOBE * determinant.ln();
+            let log = (q / total).ln() - 0.5 * samples * determinant.ln();
             Component { log, mean: own + moved, inverse: [yy / determinant, -xy / determinant, xx / determinant] }
         };
-        Self(std::array::from_fn(part))
+        Self { all: std::array::from_fn(part), samples }
     }
 
     /// How much each component has of a sample, and the logarithm of its likelihood.
@@ -145,7 +153,7 @@ impl Components {
         let most = scores.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         let shares = scores.map(|score| (score - most).exp());
         let sum: f64 = shares.iter().sum();
-        (shares.map(|share| share / sum), (most + sum.ln()) / SAMPLES_A_LOBE)
+        (shares.map(|share| share / sum), (most + sum.ln()) / self.samples)
     }
 
     /// The component that has the most of a sample.
@@ -155,10 +163,10 @@ impl Components {
     }
 
     fn scores(&self, s: &Sample) -> [f64; GAUSSIANS] {
-        self.0.map(|c| {
+        self.all.map(|c| {
             let (d, [xx, xy, yy]) = (s.at - c.mean, c.inverse);
             let square = xx * d.x * d.x + 2.0 * xy * d.x * d.y + yy * d.y * d.y;
-            c.log - 0.5 * SAMPLES_A_LOBE * (square + s.variance * (xx + yy))
+            c.log - 0.5 * self.samples * (square + s.variance * (xx + yy))
         })
     }
 
@@ -176,59 +184,20 @@ impl Components {
 
 /// The components of `samples`, from those of moments `start`; and the mean logarithm of the samples' likelihood.
 pub(super) fn fit(start: &Sums, samples: &[Sample], prior: &Prior, rounds: usize) -> (Components, f64) {
-    let mut components = Components::of(start, prior);
+    let of =
+        |sums: &Sums, round: usize| Components::counting(sums, prior, if round < SOFT_ROUNDS { 1.0 } else { SAMPLES_A_LOBE });
+    let mut components = of(start, 0);
     let mut last = f64::NEG_INFINITY;
-    for _ in 0..rounds {
+    for round in 1..=rounds {
         let (sums, likelihood) = components.moments(samples.iter());
-        components = Components::of(&sums, prior);
-        if (likelihood - last).abs() < SETTLED {
+        components = of(&sums, round);
+        let settled = (likelihood - last).abs() < SETTLED && round > SOFT_ROUNDS;
+        last = likelihood;
+        if settled {
             break;
         }
-        last = likelihood;
     }
     (components, last)
-}
-
-/// Clusters of samples from which a fit starts: those nearest to seeds that are far from each other, the first of which `seed` draws
-/// (the paper draws all). Fewer where samples are alike.
-pub(super) fn clustered(samples: &[Sample], seed: u32) -> Sums {
-    let mut centres: Vec<Sample> = Vec::with_capacity(GAUSSIANS);
-    let first = (u64::from(sobol::hash(seed)) * samples.len() as u64 >> 32) as usize;
-    centres.extend(samples.get(first));
-    while centres.len() < GAUSSIANS {
-        let far = |s: &Sample| s.mass * centres.iter().map(|c| apart(s, c)).fold(f64::INFINITY, f64::min);
-        let next = samples.iter().map(|s| (far(s), s));
-        let Some((far, next)) = next.reduce(|best, other| if other.0 > best.0 { other } else { best }) else { break };
-        if far <= 1e-9 * next.mass {
-            break;
-        }
-        centres.push(*next);
-    }
-    let mut assigned = vec![usize::MAX; samples.len()];
-    let mut sums = Sums::ZERO;
-    for _ in 0..CLUSTERING {
-        let (mut changed, mut logs) = (false, [0.0; GAUSSIANS]);
-        sums = Sums::ZERO;
-        for (s, assigned) in samples.iter().zip(&mut assigned) {
-            let distances = centres.iter().map(|c| apart(s, c)).enumerate();
-            let nearest = distances.fold((0, f64::INFINITY), |best, (i, d)| if d < best.1 { (i, d) } else { best }).0;
-            changed |= std::mem::replace(assigned, nearest) != nearest;
-            sums.take(nearest, s, 1.0);
-            logs[nearest] += s.mass * s.variance.ln();
-        }
-        if !changed {
-            break;
-        }
-        for ((centre, [q, x, y, ..]), log) in centres.iter_mut().zip(&sums.0).zip(logs).filter(|((_, m), _)| m[0] > 0.0) {
-            *centre = Sample { at: DVec2::new(*x, *y) / q, variance: (log / q).exp(), mass: *q };
-        }
-    }
-    sums
-}
-
-/// How far two lobes are from each other: places over widths, and widths.
-fn apart(a: &Sample, b: &Sample) -> f64 {
-    0.5 * (a.at - b.at).length_squared() / (a.variance * b.variance).sqrt() + 0.5 * (a.variance / b.variance).ln().powi(2)
 }
 
 impl Sample {
@@ -240,6 +209,8 @@ impl Sample {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::distribution::clustering::clustered;
+    use crate::sampling::sobol;
 
     fn samples() -> Vec<Sample> {
         // Four heaps, of which two are at one place and differ in width.
@@ -297,7 +268,7 @@ mod tests {
         let mut prior = Prior { strength: 1.0, ..Prior::default() };
         prior.add(&neighbour, 1.0);
         let (found, _) = fit(&start, &samples, &prior, 64);
-        let (mean, inverse) = (found.0[0].mean, found.0[0].inverse);
+        let (mean, inverse) = (found.all[0].mean, found.all[0].inverse);
         // Where the derivative of log likelihood and prior is 0.
         let own = samples.iter().map(|s| s.at).sum::<DVec2>() / samples.len() as f64;
         let off = own - mean;

@@ -9,6 +9,7 @@ pub mod alignment;
 pub mod brdf_map;
 pub mod chart;
 mod cluster_search;
+mod clustering;
 pub mod clusters;
 pub mod effective;
 pub mod elliptic;
