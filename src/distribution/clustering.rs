@@ -15,7 +15,7 @@ const FREE: f64 = 1e-3;
 /// (the paper draws all). Fewer where samples are alike.
 pub(super) fn clustered(samples: &[Sample], seed: u32) -> Sums {
     let mut centres: Vec<Sample> = Vec::with_capacity(GAUSSIANS);
-    let first = (u64::from(sobol::hash(seed)) * samples.len() as u64 >> 32) as usize;
+    let first = ((u64::from(sobol::hash(seed)) * samples.len() as u64) >> 32) as usize;
     centres.extend(samples.get(first));
     while centres.len() < GAUSSIANS {
         let far = |s: &Sample| s.mass * centres.iter().map(|c| apart(s, c)).fold(f64::INFINITY, f64::min);
