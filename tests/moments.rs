@@ -266,7 +266,6 @@ fn constant_maps_change_nothing() {
             Filter::Fournier7,
             Filter::BruteForce,
             Filter::Gmm,
-            Filter::GmmUnaligned,
         ];
         for filter in filters().filter(|filter| !slopes.contains(filter) && (name != "two lobes" || apart.contains(filter))) {
             let image = frame(filter);
