@@ -54,7 +54,7 @@ struct MapRecord {
     uint upright;        // whether all are about the normal
     float concentration; // of the one lobe of a material without maps of normals and roughness
     float facing;        // mean cosine of the lobes' directions to the normal
-    uvec4 clusters;      // the first, and how many there are
+    uvec4 clusters;      // the first, and how many there are; of Gaussians what gaussians.glsl says
 };
 layout(set = 2, binding = 1, std430) readonly buffer Maps {
     MapRecord maps[]; // by material
@@ -89,7 +89,7 @@ void keep(ivec2 p, inout Found f, vec3 mu, float kappa, float weight, vec3 norma
     float share = weight * moments_area(kappa, f.lobes) / f.area;
     vec3 below = f.frame * moments_direction(normal), x, y;
     tangent_basis(world, x, y);
-    uvec4 lobe = FILTER == FILTER_CLUSTERS ? found_pack_along(world, x, 1.0, 1.0, below, kappa, share) : found_pack(world, below, kappa, share);
+    uvec4 lobe = filter_elliptic(FILTER) ? found_pack_along(world, x, 1.0, 1.0, below, kappa, share) : found_pack(world, below, kappa, share);
     imageStore(lobes, ivec3(p, int(f.count)), lobe);
     f.count += 1u;
     f.sharpest = weight > MATTERS ? max(f.sharpest, kappa) : f.sharpest;
@@ -211,6 +211,7 @@ void gather(MapRecord record, uint code, mat3 turn, vec2 uv, Reach r, uint lobe_
 }
 
 #include "keep_clusters.glsl"
+#include "gaussians.glsl"
 #include "keep_texels.glsl"
 
 // Stores the lobes of a material with moments.
@@ -254,6 +255,8 @@ void decode(ivec2 p, MapRecord record, vec2 uv, vec4 footprint, inout Found f) {
         }
     } else if (FILTER == FILTER_CLUSTERS) {
         decode_clusters(p, record, uv, r, layer, f);
+    } else if (filter_of_gaussians(FILTER)) {
+        decode_gaussians(p, record, uv, r, f);
     } else if (filter_peaks(FILTER) != 0u) {
         decode_peaks(p, record, uv, r, layer, f);
     } else if (FILTER == FILTER_BRUTE_FORCE) {

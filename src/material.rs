@@ -1,7 +1,7 @@
 //! A reflectance and the textures that vary it over a surface; the f64 twin of looking them up.
 
 use crate::distribution::surface::FoundLobes;
-use crate::distribution::{LobeFit, Surface};
+use crate::distribution::{Gaussians, LobeFit, Surface};
 use crate::error::{Error, Result};
 use crate::frequency::wavelet::Grid;
 use crate::frequency::{TextureBandwidth, TextureCells};
@@ -75,6 +75,9 @@ pub struct Material {
     /// The lobes that stand for it where light is looked up, if they are known; fitted when they are needed otherwise (seconds for a
     /// table).
     pub lobe_fit: Option<Arc<LobeFit>>,
+    /// The mixtures of these maps, if the filter has some and they are known; fitted when they are needed otherwise (seconds for a
+    /// large map), or if they are of another size.
+    pub gaussians: Option<Arc<Gaussians>>,
 }
 
 impl From<Model> for Material {
@@ -116,7 +119,7 @@ pub fn geometric_kernel(dx: DVec3, dy: DVec3) -> f64 {
 impl Material {
     /// A reflectance with maps.
     pub fn new(model: Model, maps: Maps) -> Self {
-        Self { model, maps, lobe_bandwidth: None, lobe_fit: None }
+        Self { model, maps, lobe_bandwidth: None, lobe_fit: None, gaussians: None }
     }
 
     /// Whether its maps leave the model as it is, but for a factor and the normal: whether [`Self::lobe_fit`] can stand for it.

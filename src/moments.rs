@@ -3,9 +3,9 @@
 
 use crate::distribution::brdf_map::UPRIGHT;
 use crate::distribution::effective::{self, Rule, ggx_mean_cosine};
-use crate::distribution::filtered::Area;
+use crate::distribution::filtered::{Area, Known};
 use crate::distribution::surface::FoundLobes;
-use crate::distribution::{BrdfMap, Clusters, Division, Filter, Filtered, MOST_BASE_LOBES, Mixture, vmf};
+use crate::distribution::{BrdfMap, Clusters, Division, Filter, Filtered, Gaussians, MOST_BASE_LOBES, Mixture, vmf};
 use crate::material::{LEAST_ALPHA, Maps, Material, Reach, unit};
 use crate::reflectance::vmf::LEAST_PROJECTED_AREA;
 use crate::reflectance::{Ggx, Lobe, Model};
@@ -130,7 +130,7 @@ impl Parameter {
 /// The clusters of a material of which `base` is filtered by `filter`, if that has some.
 pub(crate) fn clusters(material: &Material, base: &Base, filter: Filter) -> Option<Clusters> {
     let plain = base.lobes();
-    if !filter.is_elliptic() || plain.is_empty() {
+    if !filter.has_clusters() || plain.is_empty() {
         return None;
     }
     let size = base.size(material);
@@ -147,6 +147,15 @@ pub(crate) fn clusters(material: &Material, base: &Base, filter: Filter) -> Opti
         effective::lobes(lobes.as_deref().unwrap_or(plain), normal, Rule::Exact)
     };
     Some(Clusters::of(size, !base.upright(), &texel))
+}
+
+/// The mixtures of a material of which `base` is filtered by `filter`, over maps of `size`, if the filter has some: those that are known
+/// if they are of this size.
+pub(crate) fn gaussians(material: &Material, base: &Base, size: [u32; 2], filter: Filter) -> Option<Arc<Gaussians>> {
+    let fit = filter.gaussians().filter(|_| !base.lobes().is_empty())?;
+    let map = BrdfMap::of(material, size, Rule::Exact).ok()?;
+    let known = material.gaussians.clone().filter(|known| known.are_of(&map) && known.fit() == fit);
+    Some(known.unwrap_or_else(|| Arc::new(Gaussians::of(&map, Parameter::of(&material.model).area(), fit))))
 }
 
 /// The lobes at each place of a material, at each scale.
@@ -172,8 +181,10 @@ impl Moments {
         let base = Base::of(material, rule)?;
         let size = base.size(material);
         let keep = |material: &Material, filter, rule| {
-            let (clusters, area) = (clusters(material, &base, filter), Parameter::of(&material.model).area());
-            Some(Filtered::keeping(filter, BrdfMap::of(material, size, rule).ok()?, literal, clusters, area)?.divided(division))
+            let gaussians = || gaussians(material, &base, size, filter).map_or(Known::Nothing, Known::Gaussians);
+            let known = clusters(material, &base, filter).map_or_else(gaussians, Known::Clusters);
+            let area = Parameter::of(&material.model).area();
+            Some(Filtered::keeping(filter, BrdfMap::of(material, size, rule).ok()?, literal, known, area)?.divided(division))
         };
         let lobes = if base == Base::Normals { None } else { Some(keep(material, filter, rule)?) };
         let normals = if base.upright() {

@@ -58,7 +58,7 @@ impl Passes {
             moments: match config.filter.stores() {
                 true => {
                     let (map, mips) = (brdf_map::BrdfMap::new(&mut p, config)?, vmf_mips::VmfMips::new(&mut p, config)?);
-                    let clusters = config.filter.is_elliptic().then(|| cluster_moments::ClusterMoments::new(&mut p));
+                    let clusters = config.filter.has_clusters().then(|| cluster_moments::ClusterMoments::new(&mut p));
                     Some((map, mips, clusters.transpose()?))
                 }
                 false => None,

@@ -31,7 +31,7 @@ tiling = [24, 24]
 "#;
 
 /// What is compared: each kind of what is stored, and none.
-const FILTERS: &str = "point,naive,toksvig,lean,vmf1,vmf8,clusters,fournier4";
+const FILTERS: &str = "point,naive,toksvig,lean,vmf1,vmf8,clusters,fournier4,gmm";
 
 /// Texels a side of the bumps.
 const SIDE: u32 = 32;

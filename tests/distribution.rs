@@ -1,21 +1,18 @@
 //! What the filters of normal and BRDF maps keep of a texel, against the exact mean over the texels below.
 
 mod support {
+    pub mod brdf_maps;
     pub mod statistics;
 }
 
-use glam::{DMat3, DVec3, Vec3};
-use passband::distribution::effective::Rule;
+use glam::{DMat3, DVec3};
 use passband::distribution::mixture::Masking;
 use passband::distribution::vmf::Lobe;
 use passband::distribution::{BrdfMap, Cells, Filter, Filtered, Mixture};
-use passband::material::{Maps, Material, Roughness};
-use passband::offline::texture::{Encoding, Image, MAPS, Part};
-use passband::reflectance::{Ggx, Model, Vmf};
+use passband::offline::texture::MAPS;
 use passband::sampling::sobol;
-use passband::texture::Texture;
-use std::f64::consts::{FRAC_1_SQRT_2, PI, TAU};
-use std::sync::Arc;
+use std::f64::consts::{PI, TAU};
+use support::brdf_maps::builtin;
 use support::statistics::chi_square_p;
 
 /// Texels a side of the part of a built-in map that is looked at, about its middle.
@@ -24,36 +21,6 @@ const SIDE: u32 = 256;
 /// Pair `i` of stream `seed`, in [0, 1).
 fn unit(i: u32, seed: u32) -> [f64; 2] {
     sobol::random(i, seed).map(sobol::to_unit)
-}
-
-/// The middle `side` x `side` texels of a texture, as vectors.
-fn middle(texture: &Texture, side: u32) -> Vec<Vec3> {
-    let [w, h] = texture.size().map(f64::from);
-    let at = |i: u32| glam::DVec2::new(f64::from(i % side), f64::from(i / side)) + 0.5 - f64::from(side / 2);
-    let uv = |i: u32| glam::DVec2::new(0.5 + at(i).x / w, 0.5 - at(i).y / h);
-    (0..side * side).map(|i| texture.sample(uv(i), 0.0).truncate().as_vec3()).collect()
-}
-
-/// The middle of the built-in map `name`: one lobe of the mapped concentration about the mapped normal, of `cloth` two.
-fn builtin(name: &str, side: u32) -> BrdfMap {
-    let normals = Image::builtin(name, Part::Normal).unwrap().normals(Encoding::Signed, true, 1.0).unwrap();
-    let normals: Vec<_> = middle(&normals, side)
-        .into_iter()
-        .map(|n| n.truncate().extend((1.0 - n.truncate().length_squared()).max(0.0).sqrt()).normalize().to_array())
-        .collect();
-    let normal = Some(Arc::new(Texture::normals([side; 2], &normals).unwrap()));
-    let material = if name == "cloth" {
-        let lobe = |x: f64| Lobe { mu: DVec3::new(x, 0.0, FRAC_1_SQRT_2), kappa: 128.0, weight: 1.0 };
-        let model = Vmf::new(&[FRAC_1_SQRT_2, -FRAC_1_SQRT_2].map(lobe)).unwrap();
-        Material::new(Model::Vmf(Arc::new(model)), Maps { normal, ..Maps::default() })
-    } else {
-        let kappa = middle(&Image::builtin(name, Part::Concentration).unwrap().roughness().unwrap(), side);
-        let kappa: Vec<_> = kappa.into_iter().map(|k| k.x).collect();
-        let roughness = Some((Arc::new(Texture::scalar([side; 2], &kappa).unwrap()), Roughness::Kappa));
-        let model = Model::Ggx(Ggx { alpha: 0.5, f0: DVec3::ONE, albedo: DVec3::ZERO });
-        Material::new(model, Maps { normal, roughness, ..Maps::default() })
-    };
-    BrdfMap::of(&material, [side; 2], Rule::Exact).unwrap()
 }
 
 /// A flat map of one concentration.
@@ -135,10 +102,12 @@ fn relative_errors_of_all_filters() {
         if !["checker", "cloth", "atlas"].contains(&name) {
             assert!((of(Filter::Vmf1) / of(Filter::Toksvig) - 1.0).abs() < 0.25, "{name}");
         }
-        // Clusters lie where the map's lobes are, apart by roughness. The peaks of a texel are fitted to it alone.
-        let best = Filter::stored().filter(|f| f.lobe_layers() <= 16).map(of).fold(f64::INFINITY, f64::min);
+        // Clusters lie where the map's lobes are, apart by roughness. The peaks and Gaussians of a texel are fitted to it alone.
+        let own = [Filter::Gmm, Filter::GmmUnaligned];
+        let best = Filter::stored().filter(|f| f.lobe_layers() <= 16 && !own.contains(f)).map(of).fold(f64::INFINITY, f64::min);
         assert!(of(Filter::Clusters) <= 1.2 * best + 1e-3, "{name}: {} for {best}", of(Filter::Clusters));
         assert!(of(Filter::Fournier7) <= of(Filter::Fournier4) * 1.01 + 1e-3 && of(Filter::BruteForce) < 0.01, "{name}");
+        assert!(of(Filter::Gmm) <= of(Filter::Vmf4) + 1e-3, "{name}: gmm {}", of(Filter::Gmm));
         if name != "checker" {
             assert!(of(Filter::Vmf8) <= of(Filter::Vmf4) && of(Filter::Vmf8) < of(Filter::Naive), "{name}");
         }
@@ -293,7 +262,7 @@ fn columns_and_rows_are_treated_alike() {
     let map = BrdfMap::new([48, 35], 1, lobes).unwrap();
     let other = transposed(&map);
     // Those that are found from samples in some order.
-    let ordered = [Filter::Clusters, Filter::Fournier4, Filter::Fournier7];
+    let ordered = [Filter::Clusters, Filter::Fournier4, Filter::Fournier7, Filter::Gmm, Filter::GmmUnaligned];
     for filter in Filter::stored().filter(|f| !ordered.contains(f)) {
         let [a, b] = [&map, &other].map(|m| stored(filter, m, false));
         for level in 0..a.levels() {

@@ -71,8 +71,8 @@ fn passes_store_what_the_twin_does() {
         material
     };
     scene.materials = materials().into_iter().map(named).collect();
-    // tests/clusters.rs has the others.
-    let others = [Filter::Clusters, Filter::Fournier4, Filter::Fournier7, Filter::BruteForce];
+    // tests/clusters.rs and tests/gaussians.rs have the others.
+    let others = [Filter::Clusters, Filter::Fournier4, Filter::Fournier7, Filter::BruteForce, Filter::Gmm, Filter::GmmUnaligned];
     for filter in filters().filter(|filter| !others.contains(filter)) {
         let mut session = session(&scene, &Config { filter, ..config([8, 8], Estimator::Mis, 2) });
         let names: Vec<_> = session.setup().iter().map(|(name, _)| *name).collect();
@@ -265,6 +265,7 @@ fn constant_maps_change_nothing() {
             Filter::Fournier4,
             Filter::Fournier7,
             Filter::BruteForce,
+            Filter::Gmm,
         ];
         for filter in filters().filter(|filter| !slopes.contains(filter) && (name != "two lobes" || apart.contains(filter))) {
             let image = frame(filter);

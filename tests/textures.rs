@@ -255,6 +255,7 @@ fn normals_and_roughness_come_from_level_0_and_colours_through_mips() {
     let material = Material {
         lobe_bandwidth: None,
         lobe_fit: None,
+        gaussians: None,
         model: ggx(),
         maps: Maps {
             albedo: Some(Arc::new(Texture::colour(size, &checks).unwrap())),
@@ -319,6 +320,7 @@ fn classes_share_what_is_the_same() {
     let with = |albedo: &Arc<Texture>, normal: Option<&Arc<Texture>>| Material {
         lobe_bandwidth: None,
         lobe_fit: None,
+        gaussians: None,
         model: ggx(),
         maps: Maps { albedo: Some(albedo.clone()), specular: Some(a.clone()), normal: normal.cloned(), ..Maps::default() },
     };

@@ -12,6 +12,9 @@
 //                                        direction as oct.glsl has it, concentration, mass, which is 0 of none; then, if
 //                                        lobes are not about the normal, the normals of as many
 //   bruteforce:                          of a base texel each lobe as naive has it
+//   gmm, gmm-unaligned:                  the same of a base texel; in images of their own, from level 0 on, the four Gaussians of each
+//                                        texel, as gaussians.glsl has them: mass, x, y, mean square; then, if lobes are not about
+//                                        the normal, the normals of as many: mass times x, y of their place in the plane
 //   vmf4, vmf8, vmf:                     of a base texel each lobe as vmf1 has it; from level 1 on, in images of half the size,
 //                                        of each cell weight times characteristic vector (w x, w y, w - w z) and weight w; then
 //                                        weight times spread, four cells in a layer; then, if lobes are not about the normal,
@@ -38,6 +41,8 @@ const uint FILTER_CLUSTERS = 13u;
 const uint FILTER_FOURNIER4 = 14u;
 const uint FILTER_FOURNIER7 = 15u;
 const uint FILTER_BRUTE_FORCE = 16u;
+const uint FILTER_GMM = 17u;
+const uint FILTER_GMM_UNALIGNED = 18u;
 
 // What a concentration is of.
 const uint LOBES_STAY = 0u;     // nothing: the material's own lobes stay
@@ -57,6 +62,15 @@ bool filter_of_slopes(uint filtering) {
 
 bool filter_of_cells(uint filtering) {
     return filtering == FILTER_VMF4 || filtering == FILTER_VMF8 || filtering == FILTER_VMF;
+}
+
+bool filter_of_gaussians(uint filtering) {
+    return filtering == FILTER_GMM || filtering == FILTER_GMM_UNALIGNED;
+}
+
+// Whether lobes are elliptic, of normals that follow the half vector.
+bool filter_elliptic(uint filtering) {
+    return filtering == FILTER_CLUSTERS || filter_of_gaussians(filtering);
 }
 
 // Lobes of a texel, where these are not averaged; 0 for other filters.

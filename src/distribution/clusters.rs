@@ -179,11 +179,6 @@ impl Clusters {
         };
         (self.all.iter().zip(all()).filter_map(lobe).collect(), mass)
     }
-
-    /// A vector along the mean of the directions in a texel.
-    pub(crate) fn mean_vector(&self, texel: &[f64]) -> DVec3 {
-        self.decode(texel).0.iter().map(|l| l.lobe.round.weight * l.lobe.round.mu).sum()
-    }
 }
 
 /// Less of a texel's mass is none: that is what 16 bits round to.
@@ -245,6 +240,5 @@ mod tests {
         let (lobes, _) = clusters.decode(&texel);
         assert!(lobes[0].lobe.axis.dot(DVec3::new(0.6, 0.8, 0.0)).abs() > 0.999_999, "{lobes:?}");
         assert!((lobes[0].lobe.ratio.powi(2) / 101.0 - 1.0).abs() < 0.02, "{lobes:?}");
-        assert!((clusters.mean_vector(&texel) - DVec3::Z).length() < 1e-6);
     }
 }

@@ -1,6 +1,8 @@
 //! Filters of normal and BRDF maps: what they are and what each stores.
 
+use crate::distribution::alignment::Fit;
 use crate::distribution::clusters::MOST_CLUSTERS;
+use crate::distribution::expectation::GAUSSIANS;
 use crate::distribution::mixture::Masking;
 use crate::distribution::partition::Cells;
 
@@ -48,10 +50,15 @@ pub enum Filter {
     /// The lobes of all base texels below the pixel, by the same look-ups: what no filter can be better than. A frame draws
     /// [`DRAWN_LOBES`] of them; its mean over frames has all.
     BruteForce,
+    /// A mixture of four Gaussians of each texel of each level, of which those of one number are alike in neighbours and averaged
+    /// (Tan et al. 2005).
+    Gmm,
+    /// The same of mixtures that were fitted each on its own.
+    GmmUnaligned,
 }
 
 /// What a texel of a filter's mips holds.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Storage {
     /// Mean directions and concentrations, of each lobe or of all.
     Directions { apart: bool },
@@ -65,11 +72,13 @@ pub(crate) enum Storage {
     Peaks(usize),
     /// Nothing beside the base texels' lobes.
     Base,
+    /// Moments of Gaussians, each texel's own.
+    Gaussians(Fit),
 }
 
 impl Filter {
     /// All, those that store nothing first.
-    pub const ALL: [Self; 17] = [
+    pub const ALL: [Self; 19] = [
         Self::Point,
         Self::Tk,
         Self::Naive,
@@ -87,6 +96,8 @@ impl Filter {
         Self::Fournier4,
         Self::Fournier7,
         Self::BruteForce,
+        Self::Gmm,
+        Self::GmmUnaligned,
     ];
 
     /// The name by which it is asked for.
@@ -109,6 +120,8 @@ impl Filter {
             Self::Fournier4 => "fournier4",
             Self::Fournier7 => "fournier7",
             Self::BruteForce => "bruteforce",
+            Self::Gmm => "gmm",
+            Self::GmmUnaligned => "gmm-unaligned",
         }
     }
 
@@ -148,6 +161,8 @@ impl Filter {
             Self::Fournier4 => Some(Storage::Peaks(4)),
             Self::Fournier7 => Some(Storage::Peaks(7)),
             Self::BruteForce => Some(Storage::Base),
+            Self::Gmm => Some(Storage::Gaussians(Fit::ALIGNED)),
+            Self::GmmUnaligned => Some(Storage::Gaussians(Fit::ALONE)),
         }
     }
 
@@ -161,9 +176,16 @@ impl Filter {
         matches!(self.storage(), Some(Storage::Cells(Cells::Four | Cells::Eight)))
     }
 
-    /// Whether base texels keep their lobes as they are, and mips begin at half the size in an image of their own, if there are some.
+    /// Whether it stores mixtures of Gaussians, and how these are fitted.
+    pub(crate) fn gaussians(self) -> Option<Fit> {
+        if let Some(Storage::Gaussians(fit)) = self.storage() { Some(fit) } else { None }
+    }
+
+    /// Whether base texels keep their lobes as they are, and mips are in an image of their own, if there are some. These begin at half
+    /// the size, but those of Gaussians with the base texels.
     pub(crate) fn keeps_base(self) -> bool {
-        self.has_cells() || matches!(self.storage(), Some(Storage::Clusters | Storage::Peaks(_) | Storage::Base))
+        let apart = Some(Storage::Base) == self.storage() || self.has_clusters() || self.gaussians().is_some();
+        self.has_cells() || apart || matches!(self.storage(), Some(Storage::Peaks(_)))
     }
 
     /// Whether it has such an image.
@@ -171,9 +193,14 @@ impl Filter {
         self.keeps_base() && self.storage() != Some(Storage::Base)
     }
 
-    /// Whether its lobes are elliptic.
-    pub(crate) fn is_elliptic(self) -> bool {
+    /// Whether it stores moments by clusters.
+    pub(crate) fn has_clusters(self) -> bool {
         self.storage() == Some(Storage::Clusters)
+    }
+
+    /// Whether its lobes are elliptic, of normals that follow the half vector.
+    pub(crate) fn is_elliptic(self) -> bool {
+        self.has_clusters() || self.gaussians().is_some()
     }
 
     /// Whether frames differ in the lobes that they find.
@@ -202,6 +229,7 @@ impl Filter {
             // Four texels of each of two levels.
             Some(Storage::Peaks(count)) => 8 * count,
             Some(Storage::Base) => DRAWN_LOBES,
+            Some(Storage::Gaussians(_)) => GAUSSIANS,
         };
         layers as u32
     }

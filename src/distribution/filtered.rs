@@ -3,75 +3,25 @@
 use crate::distribution::brdf_map::BrdfMap;
 use crate::distribution::clusters::{Clusters, Decoded, MOMENTS};
 use crate::distribution::filter::{Division, Filter, Storage};
-use crate::distribution::literal;
+use crate::distribution::gaussians::Gaussians;
 use crate::distribution::mip::Mips;
 use crate::distribution::mixture::Mixture;
 use crate::distribution::partition::Cells;
 use crate::distribution::peaks::Peaks;
-use crate::distribution::slope;
-use crate::distribution::stored::{CELL, Cell, KEPT, LEAST_WEIGHT, Sum, covered, kept, lobe_kept};
+use crate::distribution::stored::{CELL, Cell, DIRECTION, KEPT, LEAST_WEIGHT, Sum, covered, encode, gaussian, kept, lobe_kept};
 use crate::distribution::vmf::{self, Lobe};
 use crate::reflectance::vmf::LEAST_PROJECTED_AREA;
 use crate::texture::bilinear;
 use glam::{DVec2, DVec3};
 use std::borrow::Cow;
 use std::ops::{Add, Range};
+use std::sync::Arc;
 
 /// How often cells are divided.
 const DIVISIONS: usize = 2;
 
 /// How much greater than its lobes' own spread a cell's spread may be before it is divided.
 const SPREAD_RATIO: f64 = 1.5;
-
-/// Numbers of a texel for each lobe of directions: weight times mean direction, times concentration, and weight.
-const DIRECTION: usize = 5;
-/// For each lobe of slopes: weight times mean slope and mean products xx, xy, yy, and weight.
-const SLOPE: usize = 6;
-
-impl Storage {
-    /// Lobes or cells of a texel, and numbers of each.
-    fn layout(self, lobes: usize) -> (usize, usize) {
-        match self {
-            Self::Directions { apart } => (if apart { lobes } else { 1 }, DIRECTION),
-            Self::Slopes { apart } => (if apart { lobes } else { 1 }, SLOPE),
-            Self::Cells(cells) => (cells.count(), CELL),
-            // As many as there are.
-            Self::Clusters | Self::Peaks(_) | Self::Base => (0, 0),
-        }
-    }
-
-    /// Which lobe or cell of a texel its lobe `i` adds to.
-    fn slot(self, i: usize, lobe: &Lobe) -> usize {
-        match self {
-            Self::Directions { apart } | Self::Slopes { apart } => i * usize::from(apart),
-            Self::Cells(cells) => cells.of(lobe.mu),
-            Self::Clusters | Self::Peaks(_) | Self::Base => 0,
-        }
-    }
-
-    /// What a lobe of a texel with this normal adds; as many numbers as [`Self::layout`] says.
-    fn encode(self, lobe: &Lobe, normal: Option<DVec3>, literal: bool) -> [f64; 8] {
-        let w = lobe.weight;
-        match self {
-            Self::Directions { .. } | Self::Clusters | Self::Peaks(_) | Self::Base => {
-                let mu = w * lobe.mu;
-                [mu.x, mu.y, mu.z, w * lobe.kappa, w, 0.0, 0.0, 0.0]
-            }
-            Self::Slopes { apart } => {
-                let b = slope::of(lobe.mu);
-                let baked = slope::variance(lobe.kappa);
-                let [xx, xy, yy] = if apart { slope::carried(b, lobe.kappa) } else { [baked, 0.0, baked] };
-                [w * b.x, w * b.y, w * (b.x * b.x + xx), w * (b.x * b.y + xy), w * (b.y * b.y + yy), w, 0.0, 0.0]
-            }
-            Self::Cells(_) => {
-                let length = if literal { 1.0 - literal::spread(lobe.kappa) } else { vmf::mean_cosine(lobe.kappa) };
-                let r = w * length * lobe.mu;
-                let n = normal.map_or(r, |normal| w * normal);
-                [r.x, r.y, r.z, w, w * length, n.x, n.y, n.z]
-            }
-        }
-    }
-}
 
 /// A map as a filter stores it, with its mips.
 #[derive(Clone, Debug)]
@@ -100,6 +50,16 @@ enum Kept {
     /// All look-ups' own.
     Peaks(Peaks),
     Base,
+    Gaussians(Arc<Gaussians>),
+}
+
+/// What was found of a map before.
+#[derive(Clone, Debug, Default)]
+pub(crate) enum Known {
+    #[default]
+    Nothing,
+    Clusters(Clusters),
+    Gaussians(Arc<Gaussians>),
 }
 
 impl<'a> Filtered<'a> {
@@ -107,28 +67,34 @@ impl<'a> Filtered<'a> {
     /// 8 and 9) and its tests of length (Algorithm 1, with the weights of equation 15, without which energy would grow with the
     /// number of cells). `None` for a filter that stores nothing.
     pub fn new(filter: Filter, map: &'a BrdfMap, literal: bool) -> Option<Self> {
-        let clusters =
-            filter.is_elliptic().then(|| Clusters::of(map.size(), map.normal(0).is_some(), &|i| map.texel(i).to_vec()));
-        Self::over(filter, Cow::Borrowed(map), literal, clusters, |kappa| vmf::mean_cosine(kappa).max(LEAST_PROJECTED_AREA))
+        let known = match filter.has_clusters() {
+            true => Known::Clusters(Clusters::of(map.size(), map.normal(0).is_some(), &|i| map.texel(i).to_vec())),
+            false => Known::Nothing,
+        };
+        Self::over(filter, Cow::Borrowed(map), literal, known, |kappa| vmf::mean_cosine(kappa).max(LEAST_PROJECTED_AREA))
     }
 
-    /// The same, which keeps the map, with its clusters if the filter has some.
-    pub(crate) fn keeping(
-        filter: Filter,
-        map: BrdfMap,
-        literal: bool,
-        clusters: Option<Clusters>,
-        area: Area,
-    ) -> Option<Filtered<'static>> {
-        Filtered::over(filter, Cow::Owned(map), literal, clusters, area)
+    /// `map` with mixtures of it. `None` if they are of another size.
+    pub fn of_gaussians(map: &'a BrdfMap, known: Gaussians) -> Option<Self> {
+        let area: Area = |kappa| vmf::mean_cosine(kappa).max(LEAST_PROJECTED_AREA);
+        let all = known.are_of(map).then(|| Known::Gaussians(Arc::new(known)))?;
+        Self::over(Filter::Gmm, Cow::Borrowed(map), false, all, area)
     }
 
-    fn over(filter: Filter, map: Cow<'a, BrdfMap>, literal: bool, clusters: Option<Clusters>, area: Area) -> Option<Self> {
+    /// The same, which keeps the map, with its clusters if the filter has some, or its mixtures if these are known.
+    pub(crate) fn keeping(filter: Filter, map: BrdfMap, literal: bool, known: Known, area: Area) -> Option<Filtered<'static>> {
+        Filtered::over(filter, Cow::Owned(map), literal, known, area)
+    }
+
+    fn over(filter: Filter, map: Cow<'a, BrdfMap>, literal: bool, known: Known, area: Area) -> Option<Self> {
         let storage = filter.storage()?;
         let constant =
             map.lobes().iter().map(|l| l.weight * l.kappa).sum::<f64>() * map.lobes_per_texel() as f64 / map.lobes().len() as f64;
-        let kept = match (storage, clusters) {
-            (Storage::Clusters, clusters) => Kept::Clusters(clusters?),
+        let kept = match (storage, known) {
+            (Storage::Clusters, Known::Clusters(clusters)) => Kept::Clusters(clusters),
+            (Storage::Clusters, _) => return None,
+            (Storage::Gaussians(_), Known::Gaussians(known)) if known.are_of(&map) => Kept::Gaussians(known),
+            (Storage::Gaussians(fit), _) => Kept::Gaussians(Arc::new(Gaussians::of(&map, area, fit))),
             (Storage::Peaks(count), _) => Kept::Peaks(Peaks::of(&map, count, area)),
             (Storage::Base, _) => Kept::Base,
             _ => Kept::Nothing,
@@ -163,6 +129,7 @@ impl<'a> Filtered<'a> {
         let lobes = self.map.texel(i);
         match &self.kept {
             Kept::Base => return self.below(level, i),
+            Kept::Gaussians(all) => return all.texel(&self.map, self.area, level, i),
             Kept::Peaks(peaks) if level > 0 => {
                 let texel = peaks.texel(level, i);
                 let there = texel.iter().filter(|p| p.lobe.weight > 0.0);
@@ -228,8 +195,8 @@ impl<'a> Filtered<'a> {
             Storage::Directions { .. } => Mixture::Vmf(texel.as_chunks().0.iter().filter_map(|t| self.direction(*t)).collect()),
             Storage::Slopes { .. } => Mixture::Slopes(texel.as_chunks().0.iter().filter_map(|t| gaussian(*t)).collect()),
             Storage::Cells(_) => Mixture::Vmf(self.cells(texel).into_iter().map(|(lobe, _)| lobe).collect()),
-            Storage::Clusters => {
-                let found = self.clusters(texel).map_or_else(Vec::new, |found| found.0);
+            Storage::Clusters | Storage::Gaussians(_) => {
+                let found = self.elliptic(texel).map_or_else(Vec::new, |found| found.0);
                 Mixture::Elliptic(found.into_iter().map(|found| found.lobe).collect())
             }
             Storage::Peaks(_) | Storage::Base => {
@@ -239,15 +206,19 @@ impl<'a> Filtered<'a> {
         }
     }
 
-    /// The lobes of clusters and their mass.
-    fn clusters(&self, texel: &[f64]) -> Option<(Vec<Decoded>, f64)> {
-        if let Kept::Clusters(clusters) = &self.kept { Some(clusters.decode(texel)) } else { None }
+    /// The lobes of clusters or Gaussians and their mass.
+    fn elliptic(&self, texel: &[f64]) -> Option<(Vec<Decoded>, f64)> {
+        match &self.kept {
+            Kept::Clusters(clusters) => Some(clusters.decode(texel)),
+            Kept::Gaussians(all) => Some(all.decode(texel)),
+            Kept::Nothing | Kept::Peaks(_) | Kept::Base => None,
+        }
     }
 
     /// The concentrations below each of the lobes of [`Self::decode`] beside which the rest of their widths is the spread of
     /// normals; none where lobes do not say it.
     pub fn own_concentrations(&self, texel: &[f64]) -> Vec<f64> {
-        self.clusters(texel).map_or_else(Vec::new, |found| found.0.iter().map(|l| l.own).collect())
+        self.elliptic(texel).map_or_else(Vec::new, |found| found.0.iter().map(|l| l.own).collect())
     }
 
     /// Those of the map, if the filter has some.
@@ -255,11 +226,16 @@ impl<'a> Filtered<'a> {
         if let Kept::Clusters(clusters) = &self.kept { Some(clusters) } else { None }
     }
 
+    /// The mixtures of the map, if the filter has some.
+    pub fn gaussians(&self) -> Option<&Gaussians> {
+        if let Kept::Gaussians(all) = &self.kept { Some(all) } else { None }
+    }
+
     /// The sum of the masses over solid angle of the lobes of [`Self::decode`], where that is stored: of lobes that each fill the
     /// projected area about their own normal.
     pub fn mass(&self, texel: &[f64]) -> Option<f64> {
         match self.storage {
-            Storage::Clusters => self.clusters(texel).map(|found| found.1),
+            Storage::Clusters | Storage::Gaussians(_) => self.elliptic(texel).map(|found| found.1),
             Storage::Peaks(_) | Storage::Base => Some(texel.as_chunks().0.iter().map(|t: &[f64; KEPT]| t[4]).sum()),
             Storage::Directions { .. } | Storage::Slopes { .. } | Storage::Cells(_) => None,
         }
@@ -269,7 +245,9 @@ impl<'a> Filtered<'a> {
     pub fn normals(&self, texel: &[f64]) -> Vec<DVec3> {
         match self.storage {
             Storage::Cells(_) => self.cells(texel).into_iter().map(|(_, normal)| normal).collect(),
-            Storage::Clusters => self.clusters(texel).map_or_else(Vec::new, |f| f.0.iter().map(|l| l.normal).collect()),
+            Storage::Clusters | Storage::Gaussians(_) => {
+                self.elliptic(texel).map_or_else(Vec::new, |f| f.0.iter().map(|l| l.normal).collect())
+            }
             Storage::Peaks(_) | Storage::Base => {
                 texel.as_chunks().0.iter().filter_map(|t| lobe_kept(*t, 1.0)).map(|(_, normal)| normal).collect()
             }
@@ -287,7 +265,7 @@ impl<'a> Filtered<'a> {
                 let all = texel.as_chunks().0.iter().fold(Cell([0.0; CELL]), |sum, t| sum.plus(&Cell(*t)));
                 vec![vmf::concentration(all.base_spread()); count]
             }
-            Storage::Slopes { .. } | Storage::Clusters | Storage::Peaks(_) | Storage::Base => Vec::new(),
+            Storage::Slopes { .. } | Storage::Clusters | Storage::Peaks(_) | Storage::Base | Storage::Gaussians(_) => Vec::new(),
         }
     }
 
@@ -311,7 +289,10 @@ impl<'a> Filtered<'a> {
             }
             Storage::Cells(_) => texel.as_chunks().0.iter().map(|t| Cell(*t).normal()).sum(),
             Storage::Slopes { .. } => DVec3::Z,
-            Storage::Clusters => self.clusters_of_map().map_or(DVec3::Z, |clusters| clusters.mean_vector(texel)),
+            Storage::Clusters | Storage::Gaussians(_) => {
+                let found = self.elliptic(texel).map_or_else(Vec::new, |found| found.0);
+                found.iter().map(|l| l.lobe.round.weight * l.lobe.round.mu).sum()
+            }
             Storage::Peaks(_) | Storage::Base => {
                 texel.as_chunks().0.iter().map(|t: &[f64; KEPT]| DVec3::new(t[5], t[6], t[7])).sum()
             }
@@ -378,18 +359,4 @@ fn encode_clusters(clusters: &Clusters, lobes: &[Lobe], normal: Option<DVec3>, a
         let (i, moments) = clusters.encode(lobe, normal, lobe.weight / area(lobe.kappa));
         out[i * MOMENTS..].iter_mut().zip(moments).for_each(|(sum, m)| *sum += m);
     }
-}
-
-fn encode(storage: Storage, lobes: &[Lobe], normal: Option<DVec3>, literal: bool, out: &mut [f64]) {
-    out.fill(0.0);
-    let (_, stride) = storage.layout(lobes.len());
-    for (i, lobe) in lobes.iter().enumerate() {
-        let at = storage.slot(i, lobe) * stride;
-        out[at..at + stride].iter_mut().zip(storage.encode(lobe, normal, literal)).for_each(|(sum, c)| *sum += c);
-    }
-}
-
-fn gaussian([x, y, xx, xy, yy, weight]: [f64; SLOPE]) -> Option<slope::Lobe> {
-    let moments = [xx, xy, yy].map(|m| m / weight);
-    (weight > LEAST_WEIGHT).then(|| slope::Lobe::from_moments(DVec2::new(x, y) / weight, moments, weight))
 }

@@ -5,16 +5,20 @@
 //! and integrates to its weight; the weights of a texel sum to 1. What a texel stores is linear in its children and
 //! multiplied by the lobe's weight, so that averages, and the hardware's own filters, are exact; it is decoded once, after them.
 
+pub mod alignment;
 pub mod brdf_map;
 pub mod chart;
 mod cluster_search;
+mod clustering;
 pub mod clusters;
 pub mod effective;
 pub mod elliptic;
+pub(crate) mod expectation;
 pub mod filter;
 pub mod filtered;
 pub mod fit;
 pub mod fitter;
+pub mod gaussians;
 pub mod literal;
 pub mod mip;
 pub mod mixture;
@@ -35,6 +39,7 @@ pub use filter::{Division, Filter, MOST_BASE_LOBES};
 pub use filtered::Filtered;
 pub use fit::LobeFit;
 pub use fitter::Budget;
+pub use gaussians::Gaussians;
 pub use mixture::Mixture;
 pub use partition::Cells;
 pub use surface::Surface;

@@ -1,8 +1,9 @@
 //! What texels hold, and how it is added.
 
-use crate::distribution::literal;
+use crate::distribution::filter::Storage;
 use crate::distribution::vmf::{self, LEAST_SPREAD, Lobe};
-use glam::DVec3;
+use crate::distribution::{literal, slope};
+use glam::{DVec2, DVec3};
 use std::ops::{Add, Mul};
 
 /// Numbers of a lobe that is kept as it is: mass times direction, times concentration, mass; mass times the normal below.
@@ -11,6 +12,56 @@ pub(super) const KEPT: usize = 8;
 /// For each cell: weight times characteristic vector, weight, weight times the mean length of the characteristic vectors, and weight
 /// times the normals below: those of lobes about them are their characteristic vectors.
 pub(super) const CELL: usize = 8;
+
+/// Numbers of a texel for each lobe of directions: weight times mean direction, times concentration, and weight.
+pub(super) const DIRECTION: usize = 5;
+/// For each lobe of slopes: weight times mean slope and mean products xx, xy, yy, and weight.
+pub(super) const SLOPE: usize = 6;
+
+impl Storage {
+    /// Lobes or cells of a texel, and numbers of each.
+    pub fn layout(self, lobes: usize) -> (usize, usize) {
+        match self {
+            Self::Directions { apart } => (if apart { lobes } else { 1 }, DIRECTION),
+            Self::Slopes { apart } => (if apart { lobes } else { 1 }, SLOPE),
+            Self::Cells(cells) => (cells.count(), CELL),
+            // As many as there are.
+            Self::Clusters | Self::Peaks(_) | Self::Base | Self::Gaussians(_) => (0, 0),
+        }
+    }
+
+    /// Which lobe or cell of a texel its lobe `i` adds to.
+    fn slot(self, i: usize, lobe: &Lobe) -> usize {
+        match self {
+            Self::Directions { apart } | Self::Slopes { apart } => i * usize::from(apart),
+            Self::Cells(cells) => cells.of(lobe.mu),
+            Self::Clusters | Self::Peaks(_) | Self::Base | Self::Gaussians(_) => 0,
+        }
+    }
+
+    /// What a lobe of a texel with this normal adds; as many numbers as [`Self::layout`] says.
+    fn encode(self, lobe: &Lobe, normal: Option<DVec3>, literal: bool) -> [f64; 8] {
+        let w = lobe.weight;
+        match self {
+            Self::Directions { .. } | Self::Clusters | Self::Peaks(_) | Self::Base | Self::Gaussians(_) => {
+                let mu = w * lobe.mu;
+                [mu.x, mu.y, mu.z, w * lobe.kappa, w, 0.0, 0.0, 0.0]
+            }
+            Self::Slopes { apart } => {
+                let b = slope::of(lobe.mu);
+                let baked = slope::variance(lobe.kappa);
+                let [xx, xy, yy] = if apart { slope::carried(b, lobe.kappa) } else { [baked, 0.0, baked] };
+                [w * b.x, w * b.y, w * (b.x * b.x + xx), w * (b.x * b.y + xy), w * (b.y * b.y + yy), w, 0.0, 0.0]
+            }
+            Self::Cells(_) => {
+                let length = if literal { 1.0 - literal::spread(lobe.kappa) } else { vmf::mean_cosine(lobe.kappa) };
+                let r = w * length * lobe.mu;
+                let n = normal.map_or(r, |normal| w * normal);
+                [r.x, r.y, r.z, w, w * length, n.x, n.y, n.z]
+            }
+        }
+    }
+}
 
 /// Lobes of less weight are none.
 pub(super) const LEAST_WEIGHT: f64 = 1e-12;
@@ -108,4 +159,19 @@ impl Cell {
         let lobe = Lobe { mu, kappa, weight: share * self.weight() };
         (self.weight() > LEAST_WEIGHT).then_some((lobe, self.normal()))
     }
+}
+
+/// What the lobes of a texel add, lobe by lobe or cell by cell.
+pub(super) fn encode(storage: Storage, lobes: &[Lobe], normal: Option<DVec3>, literal: bool, out: &mut [f64]) {
+    out.fill(0.0);
+    let (_, stride) = storage.layout(lobes.len());
+    for (i, lobe) in lobes.iter().enumerate() {
+        let at = storage.slot(i, lobe) * stride;
+        out[at..at + stride].iter_mut().zip(storage.encode(lobe, normal, literal)).for_each(|(sum, c)| *sum += c);
+    }
+}
+
+pub(super) fn gaussian([x, y, xx, xy, yy, weight]: [f64; SLOPE]) -> Option<slope::Lobe> {
+    let moments = [xx, xy, yy].map(|m| m / weight);
+    (weight > LEAST_WEIGHT).then(|| slope::Lobe::from_moments(DVec2::new(x, y) / weight, moments, weight))
 }

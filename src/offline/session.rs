@@ -18,7 +18,7 @@ use crate::offline::read_back::copy_buffer;
 use crate::offline::shown::Shown;
 use crate::offline::window::{Window, near};
 use crate::offline::world::World;
-use crate::offline::{fit_cache, lobe_cache};
+use crate::offline::{fit_cache, gaussians_cache, lobe_cache};
 use crate::pass::probe::Probe;
 use crate::pass::{PassContext, brdf_map, cluster_moments, vmf_mips};
 use crate::plan::Levels;
@@ -80,12 +80,20 @@ impl Session {
             };
             materials.iter_mut().filter(|m| m.keeps_model()).for_each(fit);
         }
+        if config.filter.gaussians().is_some() {
+            let clock = Instant::now();
+            let folder = gaussians_cache::cache_folder();
+            let fit = |m: &mut crate::Material| m.gaussians = gaussians_cache::gaussians(m, config.filter, folder.as_deref());
+            materials.iter_mut().for_each(fit);
+            setup.push(("mixtures", milliseconds(clock)));
+        }
         // SAFETY: the command buffer is recording and submitted at once.
         headless.submit(|cmd, memory| Ok(unsafe { renderer.record_materials(cmd, &materials, memory) }?))?;
         // Beside the work on the processor, with which the rest of it is told.
         let on_device = of_maps(&renderer)?;
         let material_bytes = headless.live_bytes().saturating_sub(others + renderer.fit_bytes());
         let others: f64 = on_device.iter().map(|(_, time)| time).sum();
+        let others = others + setup.iter().find(|(name, _)| *name == "mixtures").map_or(0.0, |(_, time)| *time);
         setup.push((crate::pass::materials::NAME, milliseconds(clock) - others));
         setup.extend(on_device);
 

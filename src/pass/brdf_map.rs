@@ -2,6 +2,7 @@
 //! [`crate::moments`] is the f64 twin). Once a set of materials.
 
 use crate::config::Config;
+use crate::distribution::expectation::GAUSSIANS;
 use crate::distribution::filter::Storage;
 use crate::distribution::{Cells, Filter, MOST_BASE_LOBES, clusters, vmf};
 use crate::error::Result;
@@ -99,12 +100,13 @@ impl Layers {
             Some(Storage::Directions { apart }) => (!apart, 1, 0),
             Some(Storage::Slopes { apart }) => (!apart, 2, 0),
             Some(Storage::Cells(cells)) => (false, 1, cells.count()),
-            Some(Storage::Clusters | Storage::Peaks(_) | Storage::Base) => (false, 1, 0),
+            Some(Storage::Clusters | Storage::Peaks(_) | Storage::Base | Storage::Gaussians(_)) => (false, 1, 0),
         };
         let cells = match filter.storage() {
             Some(Storage::Clusters) => clusters::layers(clusters as usize, !base.upright()),
             // With normals in layers behind all.
             Some(Storage::Peaks(peaks)) => peaks * if base.upright() { 1 } else { 2 },
+            Some(Storage::Gaussians(_)) => GAUSSIANS * if base.upright() { 1 } else { 2 },
             // With their spreads, four in a layer, and the normals below lobes that are about other directions.
             _ => cells + cells / 4 + if base.upright() { 0 } else { cells },
         };
@@ -139,7 +141,7 @@ impl Group {
         first
     }
 
-    /// Images of moments and, where there are some, of cells, clusters or peaks, with room for the mips that `filter` reads; without
+    /// Images of moments and, where there are some, of cells, clusters, peaks or Gaussians, with room for the mips that `filter` reads; without
     /// the latter if these are `filled` from the host.
     pub fn images(&self, build: &mut Build<'_>, filter: Filter, filled: bool) -> Result<Vec<Image>> {
         let [width, height] = self.size;
@@ -154,15 +156,16 @@ impl Group {
     }
 }
 
-/// What mips from level 1 on are, in an image of their own: peaks are filled from the host.
+/// What mips from level 1 on are, in an image of their own, or all levels of Gaussians: these and peaks are filled from the host.
 pub(crate) fn coarser_desc(filter: Filter, size: [u32; 2], layers: usize) -> ImageDesc {
     let levels = size[0].max(size[1]).ilog2().max(1);
+    let filled = vk::ImageUsageFlags::SAMPLED | vk::ImageUsageFlags::TRANSFER_SRC;
+    let of_base = desc("gaussians", size, layers, 1 + size[0].max(size[1]).ilog2());
     let desc = desc("cells", halved(size), layers, levels);
     match filter.storage() {
         Some(Storage::Clusters) => ImageDesc { name: "clusters", format: vk::Format::R16G16B16A16_SFLOAT, ..desc },
-        Some(Storage::Peaks(_)) => {
-            ImageDesc { name: "peaks", usage: vk::ImageUsageFlags::SAMPLED | vk::ImageUsageFlags::TRANSFER_SRC, ..desc }
-        }
+        Some(Storage::Peaks(_)) => ImageDesc { name: "peaks", usage: filled, ..desc },
+        Some(Storage::Gaussians(_)) => ImageDesc { usage: filled, ..of_base },
         _ => desc,
     }
 }

@@ -1,9 +1,12 @@
 //! What filters keep of materials beside averages, made on the host once a set of materials: the table of clusters, and the texels of
-//! peaks.
+//! peaks and of Gaussians.
 
 use crate::distribution::effective::Rule;
+use crate::distribution::expectation::GAUSSIANS;
+use crate::distribution::filtered::Area;
+use crate::distribution::gaussians::MOMENTS;
 use crate::distribution::peaks::Peaks;
-use crate::distribution::{BrdfMap, Clusters, Filter};
+use crate::distribution::{BrdfMap, Clusters, Filter, Gaussians};
 use crate::gpu::image::ImageDesc;
 use crate::material::Material;
 use crate::moments::{self, Base, Parameter};
@@ -84,6 +87,68 @@ pub(crate) fn peaks(desc: &ImageDesc, size: [u32; 2], count: usize, sources: &[(
                 }
                 if let Some(texel) = layers.get_mut(texel(count + i % count)).filter(|_| *normals) {
                     *texel = [below.x, below.y, 0.0, 0.0].map(|v| v as f32);
+                }
+            }
+        }
+    }
+    bytemuck::cast_slice(&texels).to_vec()
+}
+
+/// The mixtures of a material, and the map that they are of.
+pub(crate) struct Mixtures {
+    all: Arc<Gaussians>,
+    map: BrdfMap,
+    area: Area,
+}
+
+impl Mixtures {
+    /// Of each of `materials`, of which `bases` say what is filtered, over maps of the sizes in `sizes`: none where the filter has
+    /// none. Materials of the same maps and lobes have the same mixtures.
+    pub fn of(materials: &[Material], bases: &[Option<Base>], sizes: &[Option<[u32; 2]>], filter: Filter) -> Vec<Option<Self>> {
+        let mut found: Vec<Option<Self>> = Vec::new();
+        for (i, ((material, base), size)) in materials.iter().zip(bases).zip(sizes).enumerate() {
+            let same =
+                |k: &usize| bases.get(*k) == Some(base) && sizes.get(*k) == Some(size) && same_maps(&materials[*k], material);
+            let known = (0..i).find(same).and_then(|k| found.get(k)?.as_ref()).map(|known| known.all.clone());
+            let own = |base: &Base, size: [u32; 2]| {
+                let all = known.or_else(|| moments::gaussians(material, base, size, filter))?;
+                let map = BrdfMap::of(material, size, Rule::Exact).ok()?;
+                Some(Self { all, map, area: Parameter::of(&material.model).area() })
+            };
+            found.push(base.as_ref().zip(*size).and_then(|(base, size)| own(base, size)));
+        }
+        found
+    }
+
+    /// What look-ups share, as `MapRecord::clusters` has it.
+    pub fn shared(&self) -> [u32; 4] {
+        let frame = self.all.frame();
+        [frame.middle.x, frame.middle.y, frame.floor, frame.own].map(|v| (v as f32).to_bits())
+    }
+}
+
+/// The texels of an image of Gaussians, level by level, in layers as many as are in `desc`: of the `sources`, mixtures with the first of
+/// their layers, a layer for each Gaussian and, where lobes are not about their normals, as many for these.
+pub(crate) fn gaussians(desc: &ImageDesc, sources: &[(&Mixtures, usize)]) -> Vec<u8> {
+    let mut texels: Vec<[f32; 4]> = Vec::new();
+    for level in 0..desc.levels {
+        let [width, height, _] = desc.level_extent(level);
+        let area = width as usize * height as usize;
+        let start = texels.len();
+        texels.resize(start + area * desc.layers.unwrap_or(1) as usize, [0.0; 4]);
+        let layers = &mut texels[start..];
+        for (Mixtures { all, map, area: cosine }, first) in sources {
+            let normals = map.normal(0).is_some();
+            for i in 0..area {
+                let Some(texel) = all.texel(map, *cosine, level as usize, i) else { continue };
+                for (k, moments) in texel.as_chunks::<MOMENTS>().0.iter().enumerate() {
+                    let [q, x, y, square, nx, ny] = moments.map(|v| v as f32);
+                    if let Some(texel) = layers.get_mut((first + k) * area + i) {
+                        *texel = [q, x, y, square];
+                    }
+                    if let Some(texel) = layers.get_mut((first + GAUSSIANS + k) * area + i).filter(|_| normals) {
+                        *texel = [nx, ny, 0.0, 0.0];
+                    }
                 }
             }
         }

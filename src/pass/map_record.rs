@@ -44,11 +44,12 @@ pub(super) fn rule(material: &Material) -> [f32; 2] {
 const MOST_ALPHA: f32 = 6e4;
 
 impl Record {
-    /// Of a material whose `lobes` are filtered, its clusters, and the codes of its maps, its moments and its cells.
+    /// Of a material whose `lobes` are filtered, its clusters or what its Gaussians share, and the codes of its maps, its moments and its
+    /// cells.
     pub fn of(
         material: &Material,
         lobes: &Base,
-        [first, clusters]: [u32; 2],
+        clusters: [u32; 4],
         [albedo, specular, normal, roughness, moments, cells]: [u32; 6],
     ) -> Self {
         let own = lobes.lobes();
@@ -65,7 +66,7 @@ impl Record {
             upright: u32::from(lobes.upright()),
             concentration: own.first().map_or(0.0, |lobe| lobe.kappa as f32),
             facing: lobes.facing() as f32,
-            clusters: [first, clusters, 0, 0],
+            clusters,
         }
     }
 }

@@ -16,7 +16,7 @@ use crate::material::Material;
 use crate::moments::{Base, BaseLobes, Parameter};
 use crate::pass::brdf_map::{self, BrdfMap, Group, Layers, Place, Source};
 use crate::pass::cluster_moments::{self, ClusterMoments};
-use crate::pass::kept::{self, Table};
+use crate::pass::kept::{self, Mixtures, Table};
 use crate::pass::map_record::{Record, rule};
 use crate::pass::vmf_mips::{self, VmfMips};
 use crate::texture::classes::MAX_CLASSES;
@@ -180,28 +180,38 @@ fn groups(
     (groups, places)
 }
 
-/// The images of `groups` that are filled from the host: of peaks, if the filter has some.
+/// The images of `groups` that are filled from the host: of peaks or Gaussians, if the filter has some.
 fn filled(
     build: &mut Build<'_>,
     materials: &[Material],
     groups: &[Group],
     places: &[Option<GroupPlace>],
+    mixtures: &[Option<Mixtures>],
     filter: Filter,
 ) -> Result<Vec<Option<ImageUpload>>> {
-    let Some(Storage::Peaks(count)) = filter.storage() else { return Ok(groups.iter().map(|_| None).collect()) };
+    if !matches!(filter.storage(), Some(Storage::Peaks(_) | Storage::Gaussians(_))) {
+        return Ok(groups.iter().map(|_| None).collect());
+    }
     let mut image = |(i, group): (usize, &Group)| {
         if group.layers.cells == 0 {
             return Ok(None);
         }
-        let here = |(material, place): (_, &Option<GroupPlace>)| {
+        let here = |(number, place): (usize, &Option<GroupPlace>)| {
             let place = place.as_ref().filter(|place| place.group == i && place.layers.cells > 0)?;
-            Some((material, place.first.cells))
+            Some((number, place.first.cells))
         };
-        let mut sources: Vec<(&Material, usize)> = materials.iter().zip(places).filter_map(here).collect();
+        let mut sources: Vec<(usize, usize)> = places.iter().enumerate().filter_map(here).collect();
         sources.sort_by_key(|source| source.1);
         sources.dedup_by_key(|source| source.1);
         let desc = brdf_map::coarser_desc(filter, group.size, group.layers.cells);
-        Ok(Some(ImageUpload::new(build, desc, &kept::peaks(&desc, group.size, count, &sources))?))
+        let texels = if let Some(Storage::Peaks(count)) = filter.storage() {
+            let sources: Vec<_> = sources.iter().filter_map(|(i, first)| Some((materials.get(*i)?, *first))).collect();
+            kept::peaks(&desc, group.size, count, &sources)
+        } else {
+            let sources: Vec<_> = sources.iter().filter_map(|(i, first)| Some((mixtures.get(*i)?.as_ref()?, *first))).collect();
+            kept::gaussians(&desc, &sources)
+        };
+        Ok(Some(ImageUpload::new(build, desc, &texels)?))
     };
     groups.iter().enumerate().map(&mut image).collect()
 }
@@ -248,7 +258,10 @@ impl MapsUpload {
         }
         let table = Table::of(materials, &bases, reading.filter);
         let (groups, places) = groups(materials, &bases, sizes, &slots, &table.of, reading);
-        let filled = filled(build, materials, &groups, &places, reading.filter)?;
+        let of_group = |place: &Option<GroupPlace>| Some(groups.get(place.as_ref()?.group)?.size);
+        let of_groups: Vec<_> = places.iter().map(of_group).collect();
+        let mixtures = Mixtures::of(materials, &bases, &of_groups, reading.filter);
+        let filled = filled(build, materials, &groups, &places, &mixtures, reading.filter)?;
         let camera = reading.bins == Bins::Camera;
         // Cells are behind the moments of their group, those of objects behind all.
         let firsts: Vec<_> = groups
@@ -266,7 +279,12 @@ impl MapsUpload {
         let divided = if camera { divided(materials, &bases, &places, &groups, classes.len())? } else { Vec::new() };
         let (mut uses, mut found) = (Uses::default(), Vec::new());
         let mut records = Vec::with_capacity(materials.len());
-        for ((((material, slots), base), place), clusters) in materials.iter().zip(slots).zip(bases).zip(&places).zip(&table.of) {
+        let shared = table
+            .of
+            .iter()
+            .zip(&mixtures)
+            .map(|([first, count], mixtures)| mixtures.as_ref().map_or([*first, *count, 0, 0], Mixtures::shared));
+        for ((((material, slots), base), place), shared) in materials.iter().zip(slots).zip(bases).zip(&places).zip(shared) {
             let (moments, cells) = (place.map(|p| p.moments.0), place.and_then(|p| p.cells.map(|c| c.0)));
             let mut slots = [slots.albedo, slots.specular, slots.normal, slots.roughness, moments, cells];
             if let Some(base) = base {
@@ -281,7 +299,7 @@ impl MapsUpload {
                 BaseLobes::of(&material.model, reading.rule).filter(|own| filters && own.upright() && own.lobes().len() == 1);
             let lobes = base.or(lone.map(Base::Lobes)).unwrap_or(Base::Normals);
             found.push(!lobes.lobes().is_empty());
-            records.push(Record::of(material, &lobes, *clusters, slots.map(code)));
+            records.push(Record::of(material, &lobes, shared, slots.map(code)));
         }
         let classes = classes.iter().map(|class| upload(build, class)).collect::<Result<Vec<_>>>()?;
         let usage = vk::BufferUsageFlags::STORAGE_BUFFER;

@@ -1,4 +1,4 @@
-//! What was aimed at with clusters, as far as it was measured.
+//! What was aimed at with clusters and with mixtures of Gaussians, as far as it was measured.
 
 use crate::Filter;
 use crate::offline::bench::table::Target;
@@ -41,6 +41,15 @@ pub(super) fn targets(scenes: &[SceneReport]) -> Vec<Target> {
         }),
         worst("color error of clusters over fixed's on bumps-plane", 0.35, &|scene| {
             on(&["bumps-plane"], &over("fixed", colour), scene)
+        }),
+        worst("color error of gmm over toksvig's on disk-plane", 0.48, &|scene| {
+            on(&["disk-plane"], &|scene| ratio(colour(scene.row("gmm")?)?, colour(scene.row("toksvig")?)?), scene)
+        }),
+        worst("color error of gmm over fixed's on bumps-plane", 0.35, &|scene| {
+            on(&["bumps-plane"], &|scene| ratio(colour(scene.row("gmm")?)?, colour(scene.row("fixed")?)?), scene)
+        }),
+        worst("rel_l2, less noise, of gmm over gmm-unaligned's", 1.0, &|scene| {
+            ratio(error(scene.row("gmm")?)?, error(scene.row("gmm-unaligned")?)?)
         }),
         worst("shading of clusters over vmf8's", 0.6, &over("vmf8", shading)),
         worst("shading of clusters over fournier4's", 0.25, &over("fournier4", shading)),
