@@ -31,7 +31,7 @@ tiling = [24, 24]
 "#;
 
 /// What is compared: each kind of what is stored, and none.
-const FILTERS: &str = "point,naive,toksvig,lean,vmf1,vmf8,clusters,fournier4,gmm";
+const FILTERS: &str = "point,toksvig,vmf1,vmf8,clusters,fournier4,gmm";
 
 /// Texels a side of the bumps.
 const SIDE: u32 = 32;
@@ -113,11 +113,12 @@ fn filters_are_compared_with_the_truth() {
 
     // The second run finds the truths, and finds the same.
     assert_eq!(folder.kept("truth").len(), 2);
-    let (_, again) = folder.json(&[&args[..7], &["--rounds", "1"]].concat());
+    const AGAIN: &str = "vmf1,clusters,gmm";
+    let (_, again) = folder.json(&[&args[..3], &["--filters", AGAIN], &args[5..7], &["--rounds", "1"]].concat());
     for light in ["point", "environment"] {
         let (scene, former) = (under(&again, light), under(&report, light));
         assert_eq!(scene["truth"]["cached"], former["truth"]["samples"]);
-        for filter in FILTERS.split(',') {
+        for filter in AGAIN.split(',') {
             let both = [scene, former].map(|scene| row(scene, filter));
             assert_eq!(
                 (&both[0]["errors"], &both[0]["preconvolved"]),
