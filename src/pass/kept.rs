@@ -62,6 +62,20 @@ fn same_maps(a: &Material, b: &Material) -> bool {
     key(a) == key(b) && Parameter::of(&a.model) == Parameter::of(&b.model)
 }
 
+/// The texels of the layers of `desc`, level by level, zero but for what `fill` writes: from the level, the texels of one of its layers,
+/// and those of all of them.
+fn by_level(desc: &ImageDesc, mut fill: impl FnMut(usize, usize, &mut [[f32; 4]])) -> Vec<u8> {
+    let mut texels: Vec<[f32; 4]> = Vec::new();
+    for level in 0..desc.levels {
+        let [width, height, _] = desc.level_extent(level);
+        let area = width as usize * height as usize;
+        let start = texels.len();
+        texels.resize(start + area * desc.layers.unwrap_or(1) as usize, [0.0; 4]);
+        fill(level as usize, area, &mut texels[start..]);
+    }
+    bytemuck::cast_slice(&texels).to_vec()
+}
+
 /// The texels of an image of peaks, level by level, in layers as many as are in `desc`: of the `sources`, materials with the first of
 /// their layers, `count` peaks each and, where lobes are not about them, as many normals, over maps of `size`.
 pub(crate) fn peaks(desc: &ImageDesc, size: [u32; 2], count: usize, sources: &[(&Material, usize)]) -> Vec<u8> {
@@ -71,15 +85,9 @@ pub(crate) fn peaks(desc: &ImageDesc, size: [u32; 2], count: usize, sources: &[(
         Some((Peaks::of(&map, count, Parameter::of(&material.model).area()), *first, normals))
     };
     let all: Vec<_> = sources.iter().filter_map(of).collect();
-    let mut texels: Vec<[f32; 4]> = Vec::new();
-    for level in 0..desc.levels {
-        let [width, height, _] = desc.level_extent(level);
-        let area = width as usize * height as usize;
-        let start = texels.len();
-        texels.resize(start + area * desc.layers.unwrap_or(1) as usize, [0.0; 4]);
-        let layers = &mut texels[start..];
+    by_level(desc, |level, area, layers| {
         for (peaks, first, normals) in &all {
-            for (i, peak) in peaks.level(level as usize + 1).iter().enumerate() {
+            for (i, peak) in peaks.level(level + 1).iter().enumerate() {
                 let (at, below, lobe) = (octahedron(peak.lobe.mu), octahedron(peak.normal), &peak.lobe);
                 let texel = |layer: usize| (first + layer) * area + i / count;
                 if let Some(texel) = layers.get_mut(texel(i % count)) {
@@ -90,8 +98,7 @@ pub(crate) fn peaks(desc: &ImageDesc, size: [u32; 2], count: usize, sources: &[(
                 }
             }
         }
-    }
-    bytemuck::cast_slice(&texels).to_vec()
+    })
 }
 
 /// The mixtures of a material, and the map that they are of.
@@ -130,17 +137,11 @@ impl Mixtures {
 /// The texels of an image of Gaussians, level by level, in layers as many as are in `desc`: of the `sources`, mixtures with the first of
 /// their layers, a layer for each Gaussian and, where lobes are not about their normals, as many for these.
 pub(crate) fn gaussians(desc: &ImageDesc, sources: &[(&Mixtures, usize)]) -> Vec<u8> {
-    let mut texels: Vec<[f32; 4]> = Vec::new();
-    for level in 0..desc.levels {
-        let [width, height, _] = desc.level_extent(level);
-        let area = width as usize * height as usize;
-        let start = texels.len();
-        texels.resize(start + area * desc.layers.unwrap_or(1) as usize, [0.0; 4]);
-        let layers = &mut texels[start..];
+    by_level(desc, |level, area, layers| {
         for (Mixtures { all, map, area: cosine }, first) in sources {
             let normals = map.normal(0).is_some();
             for i in 0..area {
-                let Some(texel) = all.texel(map, *cosine, level as usize, i) else { continue };
+                let Some(texel) = all.texel(map, *cosine, level, i) else { continue };
                 for (k, moments) in texel.as_chunks::<MOMENTS>().0.iter().enumerate() {
                     let [q, x, y, square, nx, ny] = moments.map(|v| v as f32);
                     if let Some(texel) = layers.get_mut((first + k) * area + i) {
@@ -152,8 +153,7 @@ pub(crate) fn gaussians(desc: &ImageDesc, sources: &[(&Mixtures, usize)]) -> Vec
                 }
             }
         }
-    }
-    bytemuck::cast_slice(&texels).to_vec()
+    })
 }
 
 /// Twin of `oct_encode` in `glsl/include/oct.glsl`.

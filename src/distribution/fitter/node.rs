@@ -6,7 +6,7 @@ use super::nnls;
 use crate::distribution::fit::{FitLobe, FitNode};
 use crate::distribution::vmf::normalisation;
 use glam::DVec3;
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DVector, DVectorViewMut};
 use std::f64::consts::PI;
 
 /// Share of the albedo, spread over the half sphere, that is added to the values by which squared errors are divided. With less,
@@ -121,8 +121,7 @@ impl<'a> Problem<'a> {
                 }
             }
         }
-        let mut cosine = columns.values.column_mut(lobes);
-        cosine.iter_mut().zip(&self.grid.directions).for_each(|(v, w)| *v = w.z.max(0.0) / PI);
+        self.cosine(columns.values.column_mut(lobes));
         columns
     }
 
@@ -149,9 +148,13 @@ impl<'a> Problem<'a> {
             let density = |w: &DVec3| peak * (kappa * (centre.dot(*w) - 1.0)).exp();
             column.iter_mut().zip(&self.grid.directions).for_each(|(v, w)| *v = density(w));
         }
-        let mut cosine = values.column_mut(lobes.len());
-        cosine.iter_mut().zip(&self.grid.directions).for_each(|(v, w)| *v = w.z.max(0.0) / PI);
+        self.cosine(values.column_mut(lobes.len()));
         std::array::from_fn(|channel| self.products(&values, channel))
+    }
+
+    /// The values of the cosine part.
+    fn cosine(&self, mut column: DVectorViewMut<'_, f64>) {
+        column.iter_mut().zip(&self.grid.directions).for_each(|(v, w)| *v = w.z.max(0.0) / PI);
     }
 
     /// The best amplitudes of `chains`, searched from those of `start`.
@@ -250,7 +253,7 @@ fn pull(chains: &[Chain], before: &State) -> impl Iterator<Item = f64> {
     })
 }
 
-fn scale<'a>(mut to: nalgebra::DVectorViewMut<'_, f64>, from: nalgebra::DVectorView<'a, f64>, weights: &[f64]) {
+fn scale<'a>(mut to: DVectorViewMut<'_, f64>, from: nalgebra::DVectorView<'a, f64>, weights: &[f64]) {
     to.iter_mut().zip(from.iter()).zip(weights).for_each(|((to, from), w)| *to = from * w);
 }
 

@@ -9,7 +9,7 @@ use nalgebra::{DMatrix, DVector};
 
 /// As good as all lobes of a node: this much more error, or this share of the error at which a fit is good enough. Frames of mirrors
 /// lose 1 dB; with 1.25 and 0.5 they lose 4, for a tenth of the time.
-const AS_GOOD: f64 = 1.1;
+const NEARLY_AS_GOOD: f64 = 1.1;
 const GOOD: f64 = 0.25;
 
 /// The lobes of `nodes` without which more of the light would be missed, where `enough` is what a fit may miss; the amplitudes of the
@@ -17,7 +17,7 @@ const GOOD: f64 = 0.25;
 pub fn thinned(samples: &Samples, nodes: Vec<FitNode>, enough: f64) -> Vec<FitNode> {
     let mut kept: Option<Vec<usize>> = None;
     let thin = |(i, node): (usize, FitNode)| {
-        let limit = (AS_GOOD * node.error).max(GOOD * enough);
+        let limit = (NEARLY_AS_GOOD * node.error).max(GOOD * enough);
         let choice = Choice { products: Problem::new(&samples.grids[i]).products_of(&node.lobes), node: &node };
         let with = |kept: &[usize]| {
             let node = choice.with(kept);

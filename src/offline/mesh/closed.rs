@@ -5,18 +5,16 @@ use glam::{DVec3, Vec3};
 use std::collections::HashMap;
 
 impl Mesh {
-    /// Whether every edge is passed as often in one direction as in the other (vertices within a millionth of the mesh's extent of
-    /// each other are one), and what is inside has a volume, so that triangles are counter-clockwise seen from outside. From
+    /// Whether every edge is passed as often in one direction as in the other (vertices that are a millionth of the mesh's extent
+    /// apart or less may count as one), and what is inside has a volume, so that triangles are counter-clockwise seen from outside. From
     /// there, a back face is always behind a front face.
     pub fn is_closed(&self) -> bool {
-        let [least, greatest] = self.bounds().map(Vec3::from);
-        let grid = f64::from((greatest - least).max_element()).max(f64::MIN_POSITIVE) * 1e-6;
-        let mut places = HashMap::with_capacity(self.positions.len());
-        let mut place_of = Vec::with_capacity(self.positions.len());
-        for position in &self.positions {
-            let next = places.len() as u64;
-            place_of.push(*places.entry(position.map(|c| (f64::from(c) / grid).round() as i64)).or_insert(next));
-        }
+        let mut numbers = HashMap::with_capacity(self.positions.len());
+        let number = |place| {
+            let next = numbers.len() as u64;
+            *numbers.entry(place).or_insert(next)
+        };
+        let place_of: Vec<u64> = self.places().into_iter().map(number).collect();
         let corner = |i: u32| Some((*place_of.get(i as usize)?, Vec3::from(*self.positions.get(i as usize)?).as_dvec3()));
         let (mut edges, mut volume) = (Vec::with_capacity(self.indices.len()), 0.0);
         for triangle in self.indices.as_chunks::<3>().0 {

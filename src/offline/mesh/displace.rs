@@ -25,17 +25,13 @@ impl Mesh {
     /// where vertices share a place (to a millionth of the mesh's extent), so that smooth seams stay closed. Normals are
     /// computed anew from the faces; tangents are dropped.
     pub fn displace(&mut self, height: impl Fn(DVec2) -> f64) {
-        let [least, greatest] = self.bounds().map(Vec3::from);
-        let grid = f64::from((greatest - least).max_element()).max(f64::MIN_POSITIVE) * 1e-6;
+        let keys = self.places();
         let mut places: HashMap<[i64; 3], Place> = HashMap::with_capacity(self.positions.len());
-        let mut keys = Vec::with_capacity(self.positions.len());
-        for ((position, normal), uv) in self.positions.iter().zip(&self.normals).zip(&self.uvs) {
-            let key = position.map(|c| (f64::from(c) / grid).round() as i64);
+        for (((position, normal), uv), key) in self.positions.iter().zip(&self.normals).zip(&self.uvs).zip(&keys) {
             let (position, normal) = (Vec3::from(*position).as_dvec3(), Vec3::from(*normal).as_dvec3());
-            let place = places.entry(key).or_insert(Place { position, normal, sum: 0.0, count: 0.0 });
+            let place = places.entry(*key).or_insert(Place { position, normal, sum: 0.0, count: 0.0 });
             place.sum += height(Vec2::from(*uv).as_dvec2());
             place.count += 1.0;
-            keys.push(key);
         }
         for ((position, normal), key) in self.positions.iter_mut().zip(&self.normals).zip(&keys) {
             let Some(place) = places.get(key) else { continue };

@@ -88,6 +88,13 @@ impl Mesh {
             && self.indices.iter().all(|i| (*i as usize) < count)
     }
 
+    /// The place of each vertex, in millionths of the mesh's extent: those of vertices that stand together are equal.
+    fn places(&self) -> Vec<[i64; 3]> {
+        let [least, greatest] = self.bounds().map(glam::Vec3::from);
+        let grid = f64::from((greatest - least).max_element()).max(f64::MIN_POSITIVE) * 1e-6;
+        self.positions.iter().map(|position| position.map(|c| (f64::from(c) / grid).round() as i64)).collect()
+    }
+
     fn require_consistent(&self) -> Result<()> {
         if self.is_consistent() {
             return Ok(());
