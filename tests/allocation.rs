@@ -1,6 +1,8 @@
 //! Directions by predicted variance: the passes against their twin in f64, the budget, what a rule gives to which material, and
 //! that it does not change what the image converges to.
 
+#[path = "support/chosen_device.rs"]
+mod chosen_device;
 #[path = "support/frames.rs"]
 mod frames;
 #[path = "support/prediction.rs"]
@@ -8,6 +10,7 @@ mod prediction;
 #[path = "support/levels.rs"]
 mod read_back;
 
+use chosen_device::DEVICE;
 use frames::{config, ggx, table, world};
 use glam::DVec3;
 use passband::frequency::Allocation;
@@ -227,7 +230,7 @@ fn reruns_are_bit_identical() {
 #[test]
 fn statistics_and_layers_say_what_was_drawn() {
     let world = scene("trio");
-    let device = Options { device: Some("llvmpipe".into()), validate: true };
+    let device = Options { device: Some(DEVICE.into()), validate: true };
     for allocation in [Allocation::Constant, Allocation::Equation8, Allocation::Deviation] {
         let aovs = vec![Aov::Samples, Aov::Shaded];
         let config = Config { rate: Rate::Bandwidth, allocation, directions: 32, ..Config::new([160, 120]) };

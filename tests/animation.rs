@@ -1,6 +1,10 @@
 //! Animated scenes: what frames show, and what `--frames` writes.
 #![cfg(feature = "offline")]
 
+#[path = "support/chosen_device.rs"]
+mod chosen_device;
+
+use chosen_device::DEVICE;
 use glam::{DMat4, DQuat, DVec3, EulerRot, Vec3};
 use passband::offline::animation::AnimatedWorld;
 use passband::offline::error::{At, Error};
@@ -17,7 +21,7 @@ use std::process::Command;
 use std::sync::Arc;
 
 fn device() -> Options {
-    Options { device: Some("llvmpipe".into()), validate: true }
+    Options { device: Some(DEVICE.into()), validate: true }
 }
 
 /// A ball and a sheet: keys for the ball and the camera, and whatever else.
@@ -299,7 +303,7 @@ fn the_command_writes_numbered_files() {
     std::fs::write(folder.path().join("s.toml"), text(MOVING)).unwrap();
     let run = |args: &str| {
         let mut command = Command::new(env!("CARGO_BIN_EXE_passband"));
-        let base = ["render", "s.toml", "--device", "llvmpipe", "--size", "24x16", "--samples", "4", "--validate"];
+        let base = ["render", "s.toml", "--device", DEVICE, "--size", "24x16", "--samples", "4", "--validate"];
         let output = command.args(base).args(args.split_whitespace()).current_dir(folder.path()).output().unwrap();
         (output.status.code().unwrap(), String::from_utf8(output.stderr).unwrap())
     };

@@ -1,11 +1,14 @@
 //! Several samples a pixel as levels below 0 (Bagher 2011, section 4, figure 15): where they are shaded, what they draw, and
 //! how far the image is from one of 64 samples a pixel, beside full supersampled shading.
 
+#[path = "support/chosen_device.rs"]
+mod chosen_device;
 #[path = "support/levels.rs"]
 mod support;
 #[path = "support/truth.rs"]
 mod truth;
 
+use chosen_device::DEVICE;
 use glam::DVec3;
 use passband::frequency::reconstruction::{PLANE, Surface};
 use passband::offline::bench::quality::{self, Frame};
@@ -143,7 +146,7 @@ fn samples_of_a_pixel_share_well_spread_directions() {
 }
 
 fn open(world: &World, config: &Config) -> Session {
-    let options = Options { device: Some("llvmpipe".into()), validate: false };
+    let options = Options { device: Some(DEVICE.into()), validate: false };
     Session::new(Headless::new(&options, &Requirements::of(config)).unwrap(), world, config).unwrap()
 }
 

@@ -1,9 +1,12 @@
 //! `passband bench` as users call it: small scenes, all of what it writes.
 
+#[path = "support/chosen_device.rs"]
+mod chosen_device;
 mod support {
     pub mod bench;
 }
 
+use chosen_device::DEVICE;
 use serde_json::Value;
 use sha2::{Digest, Sha256};
 use support::bench::{Folder, number};
@@ -49,7 +52,7 @@ fn rates_are_compared_with_full_rate_beside_their_error() {
         (&report["schema"], &report["suite"], &report["preset"], &report["rounds"]),
         (&1.into(), &"bagher".into(), &"quick".into(), &3.into())
     );
-    assert!(report["device"]["name"].as_str().unwrap().contains("llvmpipe"));
+    assert!(report["device"]["name"].as_str().unwrap().contains(DEVICE));
     let scene = &report["scenes"][0];
     assert_eq!((&scene["name"], &scene["half"], &scene["extent"]), (&"small".into(), &Value::Null, &serde_json::json!([64, 64])));
     let reference = &scene["reference"];

@@ -2,10 +2,13 @@
 //! cells, and what is refused.
 #![cfg(feature = "offline")]
 
+#[path = "support/chosen_device.rs"]
+mod chosen_device;
 mod support {
     pub mod frames;
 }
 
+use chosen_device::DEVICE;
 use glam::{DMat3, DVec2, DVec3, Mat4, Vec3};
 use passband::distribution::Cells;
 use passband::distribution::mip::Mips;
@@ -62,7 +65,7 @@ fn with(bins: Bins, filter: Filter, side: u32) -> Config {
 }
 
 fn open(world: &World, config: &Config) -> passband::offline::error::Result<Session> {
-    let options = Options { device: Some("llvmpipe".into()), validate: true };
+    let options = Options { device: Some(DEVICE.into()), validate: true };
     Session::new(Headless::new(&options, &Requirements::of(config)).unwrap(), world, config)
 }
 

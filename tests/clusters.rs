@@ -2,11 +2,14 @@
 //! are good for.
 #![cfg(feature = "offline")]
 
+#[path = "support/chosen_device.rs"]
+mod chosen_device;
 mod support {
     pub mod filters;
     pub mod frames;
 }
 
+use chosen_device::DEVICE;
 use glam::DVec3;
 use passband::moments::Moments;
 use passband::offline::builtin;
@@ -19,7 +22,7 @@ use support::filters::{Minified, blinn_phong, lobes, normals, plane, roughness, 
 use support::frames::{Stage, config, expected_with, furthest, ggx, ratio, tiles, world};
 
 fn session(world: &World, config: &Config) -> Session {
-    let options = Options { device: Some("llvmpipe".into()), validate: true };
+    let options = Options { device: Some(DEVICE.into()), validate: true };
     let headless = Headless::new(&options, &Requirements::of(config)).unwrap();
     Session::new(headless, world, config).unwrap()
 }
@@ -196,7 +199,7 @@ fn what_a_filter_cannot_do_is_refused() {
     let scene = materials();
     for filter in [Filter::Fournier4, Filter::Fournier7] {
         let refused = Config { filter, anisotropy: 4, ..config([8, 8], Estimator::Mis, 2) };
-        let options = Options { device: Some("llvmpipe".into()), validate: false };
+        let options = Options { device: Some(DEVICE.into()), validate: false };
         let headless = Headless::new(&options, &Requirements::of(&refused)).unwrap();
         let error = Session::new(headless, &scene, &refused).err().unwrap().to_string();
         assert!(error.contains("anisotropy") && error.contains("fournier"), "{error}");

@@ -1,10 +1,13 @@
 //! What residuals are said to do is what the device does, by the errors that fits have.
 #![cfg(feature = "offline")]
 
+#[path = "support/chosen_device.rs"]
+mod chosen_device;
 mod support {
     pub mod frames;
 }
 
+use chosen_device::DEVICE;
 use glam::{DVec2, DVec3};
 use passband::distribution::{Budget, LobeFit};
 use passband::offline::aov::Aov;
@@ -35,7 +38,7 @@ fn fit() -> &'static LobeFit {
 }
 
 fn layers(world: &World, config: Config, aovs: &[Aov]) -> LinearImage {
-    let device = Options { device: Some("llvmpipe".into()), validate: true };
+    let device = Options { device: Some(DEVICE.into()), validate: true };
     let settings = Settings { aovs: aovs.to_vec(), device, ..Settings::new(config) };
     let rendered = render(world, &settings, &mut |_, _| {}).unwrap();
     assert_eq!(rendered.stats.validation_messages, [""; 0]);

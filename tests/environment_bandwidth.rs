@@ -1,5 +1,9 @@
 //! The environment's bandwidth on the device against its f64 twin, and the commands that show bandwidths.
 
+#[path = "support/chosen_device.rs"]
+mod chosen_device;
+
+use chosen_device::DEVICE;
 use glam::DVec3;
 use passband::frequency::AngularBandwidth;
 use passband::frequency::environment::EPS;
@@ -14,7 +18,7 @@ use passband::{Config, Rate, Requirements, glam};
 /// The device's bandwidth of `map` at threshold `eps`, row-major, and its columns.
 fn on_device(map: &LatLong, eps: f64) -> (Vec<f32>, usize) {
     let config = Config { rate: Rate::Bandwidth, eps, ..Config::new([8, 8]) };
-    let options = Options { device: Some("llvmpipe".into()), validate: true };
+    let options = Options { device: Some(DEVICE.into()), validate: true };
     let headless = Headless::new(&options, &Requirements::of(&config)).unwrap();
     let camera = Camera { position: DVec3::Z, target: DVec3::ZERO, up: DVec3::Y, fov_y: 40.0 };
     let model = Model::Ggx(Ggx { alpha: 0.5, f0: DVec3::ONE, albedo: DVec3::ZERO });

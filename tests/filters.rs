@@ -1,10 +1,13 @@
 //! Filters that widen lobes: the kernel against its twin, the widened lobes against quadrature, and what it is good for.
 #![cfg(feature = "offline")]
 
+#[path = "support/chosen_device.rs"]
+mod chosen_device;
 mod support {
     pub mod frames;
 }
 
+use chosen_device::DEVICE;
 use glam::DVec3;
 use passband::material::{MOST_KERNEL, geometric_kernel};
 use passband::offline::builtin;
@@ -25,7 +28,7 @@ fn tk(directions: u32) -> Config {
 
 /// The kernel of each sample of a frame, and its interpolated normals and coverage.
 fn kernels(world: &World, config: &Config) -> (Vec<f64>, Vec<Option<DVec3>>) {
-    let options = Options { device: Some("llvmpipe".into()), validate: true };
+    let options = Options { device: Some(DEVICE.into()), validate: true };
     let headless = Headless::new(&options, &Requirements::of(config)).unwrap();
     let mut session = Session::new(headless, world, config).unwrap();
     session.frame([0, 0]).unwrap();

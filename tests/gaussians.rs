@@ -1,12 +1,15 @@
 //! Mixtures of Gaussians that are alike in neighbouring texels: their fit, their averages, what is on the device and in frames.
 #![cfg(feature = "offline")]
 
+#[path = "support/chosen_device.rs"]
+mod chosen_device;
 mod support {
     pub mod brdf_maps;
     pub mod filters;
     pub mod frames;
 }
 
+use chosen_device::DEVICE;
 use glam::{DVec2, DVec3};
 use passband::distribution::alignment::{Fit, Order};
 use passband::distribution::vmf::Lobe;
@@ -267,7 +270,7 @@ fn the_device_has_the_twins_mixtures() {
         .collect();
     for filter in [Filter::Gmm, Filter::GmmUnaligned] {
         let config = Config { filter, ..config([8, 8], Estimator::Mis, 2) };
-        let options = Options { device: Some("llvmpipe".into()), validate: true };
+        let options = Options { device: Some(DEVICE.into()), validate: true };
         let headless = Headless::new(&options, &Requirements::of(&config)).unwrap();
         let mut session = Session::new(headless, &scene, &config).unwrap();
         for (number, material) in scene.materials.iter().enumerate() {

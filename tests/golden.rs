@@ -2,6 +2,10 @@
 //! agree to a measured tolerance, at both vector widths; on any other, colour is judged by FLIP and layers by how many pixels
 //! are off. `scripts/bless` writes them anew.
 
+#[path = "support/chosen_device.rs"]
+mod chosen_device;
+
+use chosen_device::DEVICE;
 use passband::offline::image_io::{LinearImage, read_exr};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
@@ -58,9 +62,8 @@ impl Golden {
         let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("golden");
         std::fs::create_dir_all(&folder).unwrap();
         let [image, stats] = ["exr", "json"].map(|e| folder.join(format!("{}-{width}.{e}", self.name)));
-        let device = std::env::var("PASSBAND_DEVICE").unwrap_or_else(|_| "llvmpipe".into());
         let mut command = command();
-        command.arg("render").args(self.arguments).args(COMMON).args(["--device", &device, "--validate"]);
+        command.arg("render").args(self.arguments).args(COMMON).args(["--device", DEVICE, "--validate"]);
         command.arg("-o").arg(&image).arg("--stats").arg(&stats);
         // The driver's cache does not tell widths apart: a shader of the other width would be run, and crash or corrupt.
         command.env("MESA_SHADER_CACHE_DIR", folder.join(format!("cache-{width}")));

@@ -1,10 +1,13 @@
 //! Shading at levels: the passes against their twin in f64, no sample without a value, and what up-sampling does to images.
 
+#[path = "support/chosen_device.rs"]
+mod chosen_device;
 #[path = "support/frames.rs"]
 mod frames;
 #[path = "support/levels.rs"]
 mod read_back;
 
+use chosen_device::DEVICE;
 use frames::{Stage, config, ggx, world};
 use glam::DVec3;
 use passband::frequency::reconstruction::{self as twin, Pyramid, Source, Surface};
@@ -269,7 +272,7 @@ fn what_does_not_fit_is_refused() {
         (Config { lmax: 6, ..base.clone() }, "Config::lmax"),
         (Config { rate: Rate::Given, extent: [16384, 1], samples_per_side: 2, ..base.clone() }, "Config::extent"),
     ] {
-        let options = Options { device: Some("llvmpipe".into()), validate: true };
+        let options = Options { device: Some(DEVICE.into()), validate: true };
         let headless = Headless::new(&options, &Requirements::of(&base)).unwrap();
         let error = Session::new(headless, &ball, &changed).err().unwrap().to_string();
         assert!(error.contains(field), "{error}");

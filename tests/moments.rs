@@ -2,11 +2,14 @@
 //! what they are good for.
 #![cfg(feature = "offline")]
 
+#[path = "support/chosen_device.rs"]
+mod chosen_device;
 mod support {
     pub mod filters;
     pub mod frames;
 }
 
+use chosen_device::DEVICE;
 use glam::{DVec3, Vec3};
 use passband::distribution::Filtered;
 use passband::moments::Moments;
@@ -48,7 +51,7 @@ fn materials() -> Vec<(&'static str, Model, Maps)> {
 }
 
 fn session(world: &World, config: &Config) -> Session {
-    let options = Options { device: Some("llvmpipe".into()), validate: true };
+    let options = Options { device: Some(DEVICE.into()), validate: true };
     let headless = Headless::new(&options, &Requirements::of(config)).unwrap();
     Session::new(headless, world, config).unwrap()
 }

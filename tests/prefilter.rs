@@ -1,10 +1,13 @@
 //! Pre-convolved light on the device against dense quadrature in f64, and frames that look it up.
 #![cfg(feature = "offline")]
 
+#[path = "support/chosen_device.rs"]
+mod chosen_device;
 mod support {
     pub mod frames;
 }
 
+use chosen_device::DEVICE;
 use glam::{DVec2, DVec3};
 use passband::Texture;
 use passband::distribution::LobeFit;
@@ -46,7 +49,7 @@ impl Device {
         let environment = world.environment.as_mut().unwrap();
         (environment.intensity, environment.rotation) = (intensity, rotation);
         let config = config([8, 8], Estimator::Preconvolved, 1);
-        let options = Options { device: Some("llvmpipe".into()), validate: true };
+        let options = Options { device: Some(DEVICE.into()), validate: true };
         let headless = Headless::new(&options, &Requirements::of(&config)).unwrap();
         Self(Session::new(headless, &world, &config).unwrap())
     }
@@ -265,7 +268,7 @@ fn frames_agree_with_the_twins() {
         }
         let extent = [48, 48];
         let config = Config { fit_lobes: 8, fit_error: 0.0, ..config(extent, Estimator::Preconvolved, 1) };
-        let options = Options { device: Some("llvmpipe".into()), validate: true };
+        let options = Options { device: Some(DEVICE.into()), validate: true };
         let headless = Headless::new(&options, &Requirements::of(&config)).unwrap();
         let mut session = Session::new(headless, &world, &config).unwrap();
         session.frame([0, 0]).unwrap();
@@ -323,7 +326,7 @@ fn another_environment_in_every_frame_is_as_good_as_a_fresh_one() {
         let config = Config { rate, fit_lobes: 8, ..config([48, 32], estimator, 8) };
         let open = |map: &LatLong| {
             let world = world("bumpy-sphere", 48, table("satin"), map.clone());
-            let options = Options { device: Some("llvmpipe".into()), validate: true };
+            let options = Options { device: Some(DEVICE.into()), validate: true };
             Session::new(Headless::new(&options, &Requirements::of(&config)).unwrap(), &world, &config).unwrap()
         };
         let frame = |session: &mut Session, number: u32| {
@@ -350,7 +353,7 @@ fn another_environment_in_every_frame_is_as_good_as_a_fresh_one() {
 fn what_it_cannot_express_is_refused() {
     let map = builtin::environment("constant", 64).unwrap();
     let open = |world: &World, config: &Config| {
-        let options = Options { device: Some("llvmpipe".into()), validate: true };
+        let options = Options { device: Some(DEVICE.into()), validate: true };
         let headless = Headless::new(&options, &Requirements::of(config)).unwrap();
         Session::new(headless, world, config)
     };

@@ -1,8 +1,11 @@
 //! Image-based and best possible levels on scenes: what they shade and what it costs in error.
 
+#[path = "support/chosen_device.rs"]
+mod chosen_device;
 #[path = "support/levels.rs"]
 mod support;
 
+use chosen_device::DEVICE;
 use passband::frequency::luminance::{NOTICEABLE, levels as by_contrast};
 use passband::offline::headless::Options;
 use passband::offline::levels;
@@ -16,7 +19,7 @@ fn config(rate: Rate) -> Config {
 
 #[test]
 fn the_oracle_shades_less_than_bandwidth_at_no_more_error() {
-    let device = Options { device: Some("llvmpipe".into()), validate: true };
+    let device = Options { device: Some(DEVICE.into()), validate: true };
     for name in ["torus-knot", "trio"] {
         let world = scene(name);
         let config = config(Rate::Given);
@@ -47,7 +50,7 @@ fn contrast_of_the_frame_before_steers_luminance() {
     let world = scene("trio");
     let config = config(Rate::Luminance);
     let mut session = session(&world, &config);
-    let device = Options { device: Some("llvmpipe".into()), validate: true };
+    let device = Options { device: Some(DEVICE.into()), validate: true };
     rates::prepare(&mut session, &world, &config, false, &device, 0).unwrap();
     session.frame([0, 0]).unwrap();
     let shaded = levels::shaded(&mut session).unwrap();

@@ -1,5 +1,9 @@
 //! Every kind of reflectance on the device against its f64 twin, over pairs of directions.
 
+#[path = "support/chosen_device.rs"]
+mod chosen_device;
+
+use chosen_device::DEVICE;
 use glam::{DVec2, DVec3, Vec3};
 use passband::offline::headless::{Headless, Options};
 use passband::offline::session::Session;
@@ -27,7 +31,7 @@ fn session(models: &[Model]) -> Session {
     let camera = Camera { position: DVec3::Z, target: DVec3::ZERO, up: DVec3::Y, fov_y: 40.0 };
     let world = World { name: "probe".into(), camera, size: None, environment: None, lights: vec![], objects: vec![], materials };
     let config = Config::new([8, 8]);
-    let options = Options { device: Some("llvmpipe".into()), validate: true };
+    let options = Options { device: Some(DEVICE.into()), validate: true };
     let headless = Headless::new(&options, &Requirements::of(&config)).unwrap();
     Session::new(headless, &world, &config).unwrap()
 }

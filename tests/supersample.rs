@@ -1,10 +1,13 @@
 //! The truth for filtered materials: supersampled images against finer ones, integrals and themselves.
 #![cfg(feature = "offline")]
 
+#[path = "support/chosen_device.rs"]
+mod chosen_device;
 mod support {
     pub mod frames;
 }
 
+use chosen_device::DEVICE;
 use glam::{DVec2, DVec3, Mat4, Vec3};
 use passband::offline::animation::AnimatedWorld;
 use passband::offline::builtin;
@@ -21,7 +24,7 @@ use support::frames::{Stage, config, ggx, world};
 
 /// A supersampled image without a word of the validation layer.
 fn supersampled(world: &World, extent: [u32; 2], estimator: Estimator, samples: u32, seed: u32) -> Rendered {
-    let device = Options { device: Some("llvmpipe".into()), validate: true };
+    let device = Options { device: Some(DEVICE.into()), validate: true };
     let settings =
         Settings { supersample: Some(samples), seed, device, ..Settings::new(Config { estimator, ..Config::new(extent) }) };
     let rendered = render(world, &settings, &mut |_, _| ()).unwrap();
@@ -194,7 +197,7 @@ fn images_are_the_same_in_every_run_and_in_sequences() {
     assert_eq!(image(7), image(7));
     assert_ne!(image(7), image(8));
     let mut still: AnimatedWorld = Scene::load("maps", &[]).unwrap().animated().unwrap();
-    let device = Options { device: Some("llvmpipe".into()), validate: true };
+    let device = Options { device: Some(DEVICE.into()), validate: true };
     let settings = Settings { supersample: Some(64), device, timed: true, ..Settings::new(Config::new([20, 12])) };
     let mut frames = Vec::new();
     let mut keep = |_, image| {

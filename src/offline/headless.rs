@@ -7,7 +7,7 @@ use crate::{Requirements, Retired};
 use ash::vk;
 use gpu_allocator::vulkan::{Allocator, AllocatorCreateDesc};
 use std::ffi::{CStr, c_void};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 const VALIDATION: &CStr = c"VK_LAYER_KHRONOS_validation";
 
@@ -64,11 +64,26 @@ fn vulkan(call: &'static str) -> impl Fn(vk::Result) -> Error {
     move |result| crate::Error::Vulkan { call, result }.into()
 }
 
+/// Keeps the loader and the drivers in memory with an instance that stays. Without, each device that is the last one unloads them,
+/// and NVIDIA's driver cannot be loaded again after some dozens of times.
+fn keep_drivers(app: &vk::ApplicationInfo<'_>) {
+    static KEPT: OnceLock<Option<(ash::Entry, ash::Instance)>> = OnceLock::new();
+    KEPT.get_or_init(|| {
+        // SAFETY: as in `Instance::new`; the entry stays with the instance.
+        unsafe {
+            let entry = ash::Entry::load().ok()?;
+            let instance = entry.create_instance(&vk::InstanceCreateInfo::default().application_info(app), None).ok()?;
+            Some((entry, instance))
+        }
+    });
+}
+
 impl Instance {
     fn new(validate: bool) -> Result<Self> {
         // SAFETY: loading the system's Vulkan loader runs its initialisers, as every Vulkan program does.
         let entry = unsafe { ash::Entry::load() }.map_err(|e| Error::Device(format!("no Vulkan loader: {e}")))?;
         let app = vk::ApplicationInfo::default().application_name(c"passband").api_version(vk::API_VERSION_1_3);
+        keep_drivers(&app);
         let mut layers = Vec::new();
         let mut extensions = Vec::new();
         if validate {

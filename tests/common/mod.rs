@@ -1,16 +1,16 @@
-//! Devices on which tests run: always lavapipe, always under validation with synchronization validation.
+//! Devices on which tests run: lavapipe unless chosen otherwise, always under validation with synchronization validation.
 #![allow(dead_code, reason = "each test file uses a part")]
 
+#[path = "../support/chosen_device.rs"]
+mod chosen_device;
 #[path = "../../examples/embed_minimal.rs"]
 pub mod embed_minimal;
 pub mod rig;
 
+pub use chosen_device::DEVICE;
 pub(crate) use embed_minimal::{device, memory};
 use passband::offline::headless::{Headless, Options};
 use passband::{Config, Requirements};
-
-/// Part of the reference device's name.
-pub const DEVICE: &str = "llvmpipe";
 
 /// Fails on any validation message.
 #[track_caller]
@@ -18,7 +18,7 @@ pub fn assert_clean(messages: &[String]) {
     assert!(messages.is_empty(), "{} validation messages:\n{}", messages.len(), messages.join("\n"));
 }
 
-/// The command's own headless device, on lavapipe and validated. Hold its `messages` against [`assert_clean`] at the end.
+/// The command's own headless device, validated. Hold its `messages` against [`assert_clean`] at the end.
 pub fn headless(config: &Config) -> Headless {
     let options = Options { device: Some(DEVICE.into()), validate: true };
     let headless = Headless::new(&options, &Requirements::of(config)).unwrap();

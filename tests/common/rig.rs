@@ -12,7 +12,7 @@ use passband::{
     HostAllocator, ImageRef, Location, Output, Renderer, Requirements, Retired, Transfer, View,
 };
 
-/// Counts blocks, maps all of them (lavapipe's memory is all visible), and fails request number `fail_at` if told to.
+/// Counts blocks, maps those of all buffers, and fails request number `fail_at` if told to.
 pub struct Memory {
     plain: DedicatedAllocator,
     /// Names and addresses of the blocks that are out.
@@ -31,7 +31,7 @@ impl Memory {
         Self { plain, live: Vec::new(), requests: 0, fail_at: None, refused: None, token: 0 }
     }
 
-    /// The bytes of the live blocks called `name`, newest last.
+    /// The words of the live buffer called `name`, of the newest.
     pub fn words(&self, name: &str, count: usize) -> Vec<u32> {
         let (_, _, address) = self.live.iter().rfind(|(n, ..)| n == name).unwrap();
         // SAFETY: blocks stay mapped while they live; the caller asks for no more than the block holds.
@@ -47,11 +47,12 @@ unsafe impl HostAllocator for Memory {
             self.refused = Some(request.name.into());
             return Err(AllocationError("refused by the test".into()));
         }
-        let visible = MemoryRequest { location: Location::Upload, ..*request };
-        let mut block = self.plain.allocate(&visible)?;
+        // Images may have no visible memory to be in.
+        let location = if request.linear { Location::Upload } else { request.location };
+        let mut block = self.plain.allocate(&MemoryRequest { location, ..*request })?;
         self.token += 1;
         block.token = self.token;
-        self.live.push((request.name.into(), block.token, block.mapped.unwrap().as_ptr() as usize));
+        self.live.push((request.name.into(), block.token, block.mapped.map_or(0, |p| p.as_ptr() as usize)));
         Ok(block)
     }
 

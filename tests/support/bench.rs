@@ -1,6 +1,10 @@
 //! `passband bench` in a folder of its own.
 #![allow(dead_code, reason = "each test file uses its part")]
 
+#[path = "chosen_device.rs"]
+mod chosen_device;
+
+use chosen_device::DEVICE;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
@@ -20,7 +24,7 @@ impl Folder {
 
     pub fn run(&self, args: &[&str]) -> Output {
         let mut command = Command::new(env!("CARGO_BIN_EXE_passband"));
-        command.arg("bench").args(args).args(["--device", "llvmpipe"]).current_dir(&self.0);
+        command.arg("bench").args(args).args(["--device", DEVICE]).current_dir(&self.0);
         // Caches of every system are under these.
         command.env("XDG_CACHE_HOME", self.0.join("cache")).env("HOME", &self.0);
         command.output().unwrap()

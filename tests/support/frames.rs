@@ -1,6 +1,10 @@
 //! Worlds, frames on lavapipe under the validation layer, and their comparison with the f64 reference.
 #![allow(dead_code, reason = "each test file uses its part")]
 
+#[path = "chosen_device.rs"]
+mod chosen_device;
+
+use chosen_device::DEVICE;
 use glam::{DVec3, Mat4};
 use passband::offline::builtin;
 use passband::offline::headless::{Headless, Options};
@@ -71,7 +75,7 @@ pub struct Stage {
 
 impl Stage {
     pub fn new(world: &World, config: &Config) -> Self {
-        let options = Options { device: Some("llvmpipe".into()), validate: true };
+        let options = Options { device: Some(DEVICE.into()), validate: true };
         let headless = Headless::new(&options, &Requirements::of(config)).unwrap();
         Self { session: Session::new(headless, world, config).unwrap() }
     }

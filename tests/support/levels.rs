@@ -1,6 +1,10 @@
 //! Random levels and surfaces, and what a frame decided on them, read back into the types of the f64 twin.
 #![allow(dead_code, reason = "each test file uses its part")]
 
+#[path = "chosen_device.rs"]
+mod chosen_device;
+
+use chosen_device::DEVICE;
 use glam::{DMat3, DVec3};
 use passband::frequency::reconstruction::{self as twin, Pyramid, Sample, Source, Surface};
 use passband::offline::headless::{Headless, Options};
@@ -65,7 +69,7 @@ pub fn random_surface(extent: [usize; 2], seed: u32) -> Surface {
 }
 
 pub fn session(world: &World, config: &Config) -> Session {
-    let options = Options { device: Some("llvmpipe".into()), validate: true };
+    let options = Options { device: Some(DEVICE.into()), validate: true };
     let headless = Headless::new(&options, &Requirements::of(config)).unwrap();
     Session::new(headless, world, config).unwrap()
 }

@@ -1,5 +1,9 @@
 //! Images of more samples a pixel than a renderer takes.
 
+#[path = "chosen_device.rs"]
+mod chosen_device;
+
+use chosen_device::DEVICE;
 use passband::offline::bench::quality::Frame;
 use passband::offline::headless::{Headless, Options};
 use passband::offline::metrics::Picture;
@@ -15,7 +19,7 @@ const SEED: u32 = 0x7472_7574;
 pub fn supersampled(world: &World, extent: [u32; 2], directions: u32) -> Frame {
     let config =
         Config { frames_in_flight: 1, samples_per_side: 4, rate: Rate::Full, directions, ..Config::new(extent.map(|e| 2 * e)) };
-    let options = Options { device: Some("llvmpipe".into()), validate: false };
+    let options = Options { device: Some(DEVICE.into()), validate: false };
     let headless = Headless::new(&options, &Requirements::of(&config)).unwrap();
     let mut session = Session::new(headless, world, &config).unwrap();
     session.frame([SEED, 0]).unwrap();

@@ -2,6 +2,8 @@
 
 mod angles;
 mod bandwidth;
+#[path = "../support/chosen_device.rs"]
+mod chosen_device;
 mod environment;
 mod materials;
 mod sampling;
@@ -9,6 +11,7 @@ mod sampling;
 mod statistics;
 mod vmf;
 
+use chosen_device::DEVICE;
 use glam::{DVec3, Vec3};
 use passband::offline::headless::{Headless, Options};
 use passband::offline::session::Session;
@@ -43,7 +46,7 @@ struct Device(Session);
 impl Device {
     fn new(models: Vec<Model>, environment: Option<EnvironmentLight>) -> Self {
         let config = Config::new([8, 8]);
-        let options = Options { device: Some("llvmpipe".into()), validate: true };
+        let options = Options { device: Some(DEVICE.into()), validate: true };
         let headless = Headless::new(&options, &Requirements::of(&config)).unwrap_or_else(|e| panic!("{e}"));
         let camera = Camera { position: DVec3::Z, target: DVec3::ZERO, up: DVec3::Y, fov_y: 40.0 };
         let material = |(i, model): (usize, Model)| Material { name: i.to_string(), model, maps: Default::default() };
