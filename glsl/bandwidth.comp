@@ -7,6 +7,7 @@ layout(constant_id = 2) const bool KERNEL = false;
 #define MATERIAL_KERNEL KERNEL
 #include "frame.glsl"
 #include "gbuffer.glsl"
+#include "luminance.glsl"
 #include "materials.glsl"
 #include "local.glsl"
 #include "environment.glsl"
@@ -92,10 +93,6 @@ void add(inout Sums s, float bandwidth, float radiance, float reflected, float p
     s.radiance += radiance;
     s.greatest = max(s.greatest, weight > 0.0 ? bandwidth : 0.0);
     s.squares += weight * weight;
-}
-
-float luminance(vec3 c) {
-    return dot(c, vec3(0.2126, 0.7152, 0.0722));
 }
 
 // Level of the samples of a block, which it writes unless it forecasts.

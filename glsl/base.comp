@@ -35,22 +35,7 @@ layout(set = 2, binding = 3, std430) readonly buffer Lights {
     LightRecord lights[];
 };
 layout(set = 2, binding = 4, rgba32f) uniform writeonly image2D radiance;
-
-// What light from unit world direction w adds, of irradiance `power` at normal incidence.
-vec3 reflected_light(Local f, Material m, Lobes l, vec3 w, vec3 power) {
-    vec3 wi = vec3(dot(w, f.x), dot(w, f.y), dot(w, f.z));
-    bool above = wi.z > 0.0;
-    wi = above ? wi : f.view;
-    vec3 h = normalize(wi + f.view), value = vec3(0.0);
-    if (UNFILTERED != 0u) {
-        value = material_evaluate(m, wi, f.view, h) * wi.z;
-    }
-    if (LOBED != 0u) {
-        vec3 found = lobes_evaluate(m, l, wi, f.view, h).rgb;
-        value = l.count > 0u ? found : value;
-    }
-    return above ? value * power : vec3(0.0);
-}
+#include "direct.glsl"
 
 void main() {
     ivec2 p = ivec2(gl_GlobalInvocationID.xy);
@@ -67,19 +52,15 @@ void main() {
 
     Approximation a = approximation_load(m, l, f.view);
     vec3 sum = a.diffuse * prefiltered_irradiance(f.z);
+    float sharpest = 0.0;
     for (uint i = 0u; i < a.count; ++i) {
         ReflectedLobe lobe = approximation_lobe(m, l, a, i, f.view);
+        sharpest = max(sharpest, lobe.kappa);
         sum += lobe.weight * prefiltered(to_world(f, lobe.direction), EXACT != 0u ? min(lobe.kappa, prefiltered_most()) : lobe.kappa);
     }
-    for (uint i = 0u; i < prefiltered_suns(); ++i) {
-        sum += reflected_light(f, m, l, prefiltered_sun(i), prefiltered_sun_irradiance(i));
-    }
+    sum += reflected_suns(f, m, l, a, sharpest);
     if (LOCAL_LIGHTS) {
-        vec3 at = frame.eye.xyz + ray * gbuffer_depth(p);
-        for (uint i = 0u; i < frame.lights.x; ++i) {
-            vec4 w = light_exact(lights[i], at);
-            sum += reflected_light(f, m, l, w.xyz, lights[i].power.rgb * w.w);
-        }
+        sum += reflected_lights(f, m, l, frame.eye.xyz + ray * gbuffer_depth(p));
     }
     imageStore(radiance, p, vec4(sum, 1.0));
 }

@@ -1,19 +1,14 @@
 // The lobes that stand for a material as look-ups of pre-convolved light hold them: what is estimated beside a look-up is what these
-// leave of the reflectance. Include after approximation.glsl; the includer defines CONTROL_BINDING and enables
+// leave of the reflectance. Include after approximation.glsl; the includer reads suns and enables
 // GL_EXT_control_flow_attributes.
 #ifndef CONTROL_VARIATE_GLSL
 #define CONTROL_VARIATE_GLSL
-#include "suns.glsl"
 #include "texel_kernel.glsl"
 
 // The most lobes that stand for a material.
 layout(constant_id = 14) const uint APPROXIMATING = 1u;
 // Whether lobes are taken to be just what look-ups of them hold.
 layout(constant_id = 16) const uint EXACT = 0u;
-
-layout(set = 2, binding = CONTROL_BINDING, std430) readonly buffer ControlSuns {
-    SunList suns;
-} control;
 
 // The lobes that stand for the material as they are looked up, which is between two levels (glsl/include/prefilter.glsl): direction;
 // exponent of a squared distance in the broader level, height there, height in the sharper one, whether that is the map;
@@ -25,15 +20,18 @@ vec3 approximating_sharp[APPROXIMATING];
 bool approximating_map[APPROXIMATING];
 bool approximating_even[APPROXIMATING]; // the sharper level is one of the second image
 vec3 approximating_diffuse;
+float approximating_sharpest; // the largest concentration
 
 void approximate(Material m, Lobes l, Approximation a, vec3 wo) {
     approximating_diffuse = a.diffuse;
+    approximating_sharpest = 0.0;
     [[unroll]] for (uint i = 0u; i < APPROXIMATING; ++i) {
         bool there = i < a.count;
         ReflectedLobe lobe = approximation_lobe(m, l, a, there ? i : 0u, wo);
         approximating_direction[i] = lobe.direction;
+        approximating_sharpest = max(approximating_sharpest, there ? lobe.kappa : 0.0);
         // As `prefiltered` has it; the map's bilinear look-ups are 4 factors of 2 sharper than the sharpest lobe.
-        vec4 scale = control.suns.scale;
+        vec4 scale = environment_suns.list.scale;
         float steps = min(-log2(lobe.kappa * scale.x), scale.y);
         steps = EXACT != 0u ? max(steps, 0.0) : steps;
         bool map = steps < 0.0;

@@ -4,14 +4,12 @@
 #define PREFILTER_GLSL
 #include "frame.glsl"
 #include "latlong.glsl"
+#define SUNS_BINDING PREFILTER_BINDING + 3
 #include "suns.glsl"
 
 layout(set = 2, binding = PREFILTER_BINDING) uniform sampler2D prefilter_first;      // level 0 the map, then x4 less a level
 layout(set = 2, binding = PREFILTER_BINDING + 1) uniform sampler2D prefilter_second; // twice the first's next level, with its own level's size
 layout(set = 2, binding = PREFILTER_BINDING + 2) uniform sampler2D prefilter_irradiance;
-layout(set = 2, binding = PREFILTER_BINDING + 3, std430) readonly buffer PrefilterSuns {
-    SunList suns;
-} prefilter;
 
 // Columns wrap, rows go on beyond the poles.
 vec2 prefilter_uv(vec3 w) {
@@ -22,13 +20,13 @@ vec2 prefilter_uv(vec3 w) {
 // Mean radiance under a lobe of concentration kappa about world direction w.
 vec3 prefiltered(vec3 w, float kappa) {
     // Steps of a factor of 2 down from the second's level 0; above it is the map.
-    float steps = min(-log2(kappa * prefilter.suns.scale.x), prefilter.suns.scale.y);
+    float steps = min(-log2(kappa * environment_suns.list.scale.x), environment_suns.list.scale.y);
     float first = floor(0.5 * steps) + 1.0, second = floor(0.5 * steps + 0.5);
     float weight = 1.0 - abs(steps - (2.0 * first - 1.0));
     bool map = steps < 0.0;
     first = map ? 0.0 : first;
     second = map ? 0.0 : min(second, first);
-    weight = map ? min(-steps * prefilter.suns.scale.z, 1.0) : weight;
+    weight = map ? min(-steps * environment_suns.list.scale.z, 1.0) : weight;
     vec2 uv = prefilter_uv(w);
     vec3 a = textureLod(prefilter_first, uv, first).rgb, b = textureLod(prefilter_second, uv, second).rgb;
     return mix(b, a, weight) * frame.environment.y;
@@ -36,26 +34,12 @@ vec3 prefiltered(vec3 w, float kappa) {
 
 // Concentration of the sharpest level.
 float prefiltered_most() {
-    return 1.0 / prefilter.suns.scale.x;
+    return 1.0 / environment_suns.list.scale.x;
 }
 
 // On a surface with world normal n.
 vec3 prefiltered_irradiance(vec3 n) {
     return textureLod(prefilter_irradiance, prefilter_uv(n), 0.0).rgb * frame.environment.y;
-}
-
-uint prefiltered_suns() {
-    return uint(prefilter.suns.count.x);
-}
-
-// World direction towards a sun.
-vec3 prefiltered_sun(uint i) {
-    return latlong_direction(prefilter.suns.all[i].place.xy + vec2(frame.environment.x, 0.0)).xyz;
-}
-
-// Its irradiance at normal incidence.
-vec3 prefiltered_sun_irradiance(uint i) {
-    return prefilter.suns.all[i].irradiance.rgb * frame.environment.y;
 }
 
 #endif

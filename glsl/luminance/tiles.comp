@@ -2,6 +2,7 @@
 // Of each tile of 8x8 output pixels of the frame before: mean luminance, error of half the resolution, sum and coverage.
 // src/frequency/luminance.rs is the f64 twin.
 #include "frame.glsl"
+#include "luminance.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
 
@@ -14,7 +15,7 @@ const int TILE = 8;
 
 vec2 light(ivec2 p) {
     vec4 c = texelFetch(previous, p, 0);
-    return vec2(dot(c.rgb, vec3(0.2126, 0.7152, 0.0722)), c.a);
+    return vec2(luminance(c.rgb), c.a);
 }
 
 void main() {

@@ -4,6 +4,7 @@
 use crate::sampling::latlong::direction;
 use crate::sampling::{LatLong, luminance};
 use glam::{DVec2, DVec3};
+use std::collections::BTreeMap;
 use std::f64::consts::{PI, TAU};
 
 /// The most suns of one map.
@@ -13,16 +14,24 @@ const BRIGHT: f64 = 100.0;
 /// The largest angle in radians between a sun's brightest texel and its others, unless these are the next but one.
 const RADIUS: f64 = 0.025;
 
+/// The most points that stand for a sun.
+pub const MAX_POINTS: usize = 64;
+
 /// Groups of bright texels that are looked at, brightest first.
 const MOST_GROUPS: usize = 64;
 
 /// A spot of the map as a directional light.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Sun {
     /// Towards it, in the map's own frame.
     pub direction: DVec3,
     /// Irradiance at normal incidence.
     pub irradiance: DVec3,
+    /// Its parts, for reflectances in which its shape is seen: direction and irradiance of each texel, or of each square of them
+    /// where there are more than [`MAX_POINTS`].
+    pub points: Vec<[DVec3; 2]>,
+    /// The largest angle in radians between `direction` and a point's.
+    pub radius: f64,
     /// First and last column and row of its texels; columns wrap, and the first may be negative.
     pub texels: [i32; 4],
 }
@@ -57,6 +66,24 @@ fn place(map: &LatLong, i: usize) -> [i32; 2] {
 fn towards(map: &LatLong, [x, y]: [i32; 2]) -> DVec3 {
     let size = DVec2::new(map.width().into(), map.height().into());
     direction(DVec2::new(f64::from(x) + 0.5, f64::from(y) + 0.5) / size)
+}
+
+/// Direction and irradiance of several parts: the mean by luminance, and the sum.
+fn together<'a>(parts: impl Iterator<Item = &'a [DVec3; 2]>) -> [DVec3; 2] {
+    let add = |[mean, sum]: [DVec3; 2], &[at, taken]: &[DVec3; 2]| [mean + at * luminance(taken), sum + taken];
+    let [mean, sum] = parts.fold([DVec3::ZERO; 2], add);
+    [mean.normalize(), sum]
+}
+
+/// At most [`MAX_POINTS`] parts: what lies in each square of as few texels as that takes.
+fn squares(parts: &[([i32; 2], [DVec3; 2])]) -> Vec<[DVec3; 2]> {
+    let by = |side: i32| {
+        let mut squares: BTreeMap<[i32; 2], Vec<&[DVec3; 2]>> = BTreeMap::new();
+        parts.iter().for_each(|(place, part)| squares.entry(place.map(|e| e / side)).or_default().push(part));
+        squares
+    };
+    let few = (1..).map(by).find(|squares| squares.len() <= MAX_POINTS).unwrap_or_default();
+    few.into_values().map(|square| together(square.into_iter())).collect()
 }
 
 impl Suns {
@@ -111,20 +138,23 @@ impl Suns {
             let x = column(x);
             [x0.min(x), x1.max(x), y0.min(y), y1.max(y)]
         });
-        let sun = Sun { direction: DVec3::ZERO, irradiance: DVec3::ZERO, texels: bounds };
-        self.suns.push(sun);
-        let number = self.suns.len() - 1;
-        let (mut irradiance, mut mean) = (DVec3::ZERO, DVec3::ZERO);
+        // Its texels are known by their bounds.
+        let number = self.suns.len();
+        self.suns.push(Sun { direction: DVec3::ZERO, irradiance: DVec3::ZERO, points: Vec::new(), radius: 0.0, texels: bounds });
         let [x0, x1, y0, y1] = bounds;
-        for at in (y0..=y1).flat_map(|y| (x0..=x1).map(move |x| [x.rem_euclid(map.width() as i32), y])) {
+        let mut parts = Vec::new();
+        for place in (y0..=y1).flat_map(|y| (x0..=x1).map(move |x| [x, y])) {
+            let at = [place[0].rem_euclid(map.width() as i32), place[1]];
             let texel = map.texel(at[0].into(), at[1].into());
             if self.sun_of(map, at) == Some(number) {
                 let taken = (texel - texel * self.factor(texel)) * solid_angle(map, at[1] as u32);
-                irradiance += taken;
-                mean += towards(map, at) * luminance(taken);
+                parts.push(([place[0] - x0, place[1] - y0], [towards(map, at), taken]));
             }
         }
-        self.suns[number] = Sun { direction: mean.normalize(), irradiance, texels: bounds };
+        let [direction, irradiance] = together(parts.iter().map(|(_, part)| part));
+        let points = squares(&parts);
+        let radius = points.iter().map(|[at, _]| at.angle_between(direction)).fold(0.0, f64::max);
+        self.suns[number] = Sun { direction, irradiance, points, radius, texels: bounds };
     }
 
     /// The sun that the texel in column and row `at` belongs to.
@@ -212,9 +242,23 @@ mod tests {
             );
         }
         let map = map([512, 256], &[([511, 100], 3)]);
-        let sun = Suns::of(&map).suns[0];
+        let sun = &Suns::of(&map).suns[0];
         let expected = direction(DVec2::new(0.5 / 512.0, 101.5 / 256.0));
         assert!(sun.direction.distance(expected) < 1e-3, "{sun:?}");
+        assert_eq!(sun.points.len(), 9);
+        let texel = PI / 256.0;
+        assert!(sun.radius > texel && sun.radius < 1.5 * texel, "{}", sun.radius);
+    }
+
+    /// A sun of more texels than there may be points: what they add up to is the same.
+    #[test]
+    fn points_add_up_to_the_sun() {
+        let map = map([2048, 1024], &[([700, 420], 11)]);
+        let sun = &Suns::of(&map).suns[0];
+        assert!(sun.points.len() <= MAX_POINTS && sun.points.len() >= MAX_POINTS / 4, "{}", sun.points.len());
+        let [mean, sum] = together(sun.points.iter());
+        assert!((sum / sun.irradiance - 1.0).abs().max_element() < 1e-12, "{sum} {}", sun.irradiance);
+        assert!(mean.distance(sun.direction) < 1e-5, "{mean} {}", sun.direction);
     }
 
     #[test]

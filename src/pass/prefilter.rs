@@ -6,7 +6,7 @@
 //! another level, so that no error adds up. All of it lies in one buffer, which is copied into an image with mips at the end.
 
 use crate::distribution::prefilter::{Chain, SOURCE_WIDTH, STEPS_TO_MAP};
-use crate::distribution::suns::{MAX_SUNS, Suns};
+use crate::distribution::suns::{MAX_POINTS, MAX_SUNS, Suns};
 use crate::error::Result;
 use crate::gpu::access::Access;
 use crate::gpu::buffer::Buffer;
@@ -21,6 +21,7 @@ use crate::pass::PassContext;
 use crate::sampling::{LatLong, latlong};
 use ash::vk::{self, DescriptorType as D};
 use bytemuck::{Pod, Zeroable};
+use glam::DVec3;
 
 /// Pass, label and timer name.
 pub const NAME: &str = "prefilter";
@@ -71,6 +72,7 @@ struct SunList {
     rule: [f32; 4],
     count: [i32; 4],
     all: [SunRecord; MAX_SUNS],
+    points: [SunPoint; MAX_SUNS * MAX_POINTS],
 }
 
 #[repr(C)]
@@ -79,6 +81,14 @@ struct SunRecord {
     place: [f32; 4],
     irradiance: [f32; 4],
     texels: [i32; 4],
+    points: [u32; 4],
+}
+
+#[repr(C)]
+#[derive(Clone, Copy, Pod, Zeroable)]
+struct SunPoint {
+    place: [f32; 4],
+    irradiance: [f32; 4],
 }
 
 impl SunList {
@@ -90,13 +100,22 @@ impl SunList {
             count: [suns.len() as i32, 0, 0, 0],
             ..Self::zeroed()
         };
+        let place = |direction, z: f64| latlong::uv(direction).extend(z).extend(0.0).as_vec4().to_array();
+        let rgb = |irradiance: DVec3| irradiance.extend(0.0).as_vec4().to_array();
+        let mut points = Vec::new();
         for (record, sun) in list.all.iter_mut().zip(&suns) {
-            let uv = latlong::uv(sun.direction).as_vec2();
             let [x0, x1, y0, y1] = sun.texels;
-            record.place = [uv.x, uv.y, 0.0, 0.0];
-            record.irradiance = sun.irradiance.extend(0.0).as_vec4().to_array();
-            record.texels = [x0.rem_euclid(map.width() as i32), x1 - x0, y0, y1];
+            let distance = 2.0 * (0.5 * sun.radius).sin();
+            *record = SunRecord {
+                place: place(sun.direction, distance * distance),
+                irradiance: rgb(sun.irradiance),
+                texels: [x0.rem_euclid(map.width() as i32), x1 - x0, y0, y1],
+                points: [points.len() as u32, sun.points.len() as u32, 0, 0],
+            };
+            let part = |&[at, taken]: &[DVec3; 2]| SunPoint { place: place(at, 0.0), irradiance: rgb(taken) };
+            points.extend(sun.points.iter().map(part));
         }
+        list.points[..points.len()].copy_from_slice(&points);
         list
     }
 }

@@ -14,5 +14,6 @@ vec4 probe(uint i) {
         return vec4(prefiltered_irradiance(e.xyz), 0.0);
     }
     uint sun = uint(-e.w) - 2u;
-    return sun < prefiltered_suns() ? vec4(prefiltered_sun(sun), prefiltered_sun_irradiance(sun).r) : vec4(-1.0);
+    SunRecord record = environment_suns.list.all[min(sun, MAX_SUNS - 1u)];
+    return sun < suns_count() ? vec4(suns_direction(record.place.xy), record.irradiance.r * frame.environment.y) : vec4(-1.0);
 }
