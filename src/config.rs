@@ -27,8 +27,10 @@ pub enum Estimator {
     /// That, and what the lobes leave of the reflectance estimated as [`Self::Mis`] does: they are its control variate, so that the
     /// mean is right. At [`Rate::Full`] only.
     Cv,
-    /// The same, but as factors on what is looked up, which up-sampling carries instead of radiance, and only where a fit's error
-    /// says that it is worth it ([`Config::residual_errors`]).
+    /// The same, but as factors on what is looked up, which up-sampling carries instead of radiance; only where a fit's error says
+    /// that it is worth it ([`Config::residual_errors`]), and as far as it is no noise: of each sample's estimate the lobes are taken
+    /// out as much as makes its variance least, and one that is smaller than its own noise is none. At [`Rate::Full`] it is
+    /// [`Self::Cv`].
     Residual,
     /// No estimate: reflectance and radiance looked up in hashed directions and summed. Its time is the least that any
     /// estimator with as many directions can take on a device.
@@ -242,6 +244,11 @@ impl Config {
     /// Whether levels follow from the predicted bandwidth of the image.
     pub(crate) fn predicts(&self) -> bool {
         self.rate == Rate::Bandwidth && !self.estimator.looks_up()
+    }
+
+    /// Whether what is estimated beside looked-up light is a factor on it.
+    pub(crate) fn residual_is_factor(&self) -> bool {
+        self.estimator == Estimator::Residual && self.rate != Rate::Full
     }
 
     /// Whether the mesh's curvature widens lobes.

@@ -54,12 +54,14 @@ impl Folder {
         Run { code: output.status.code().unwrap(), stdout: text(output.stdout), stderr: text(output.stderr) }
     }
 
-    /// `render` on the reference driver under the validation layer, any message of which is a failure; small unless told
-    /// otherwise.
+    /// `render` on the reference driver under the validation layer, any message of which is a failure; small, at full rate and
+    /// with the plain estimator unless told otherwise.
     fn render(&self, scene: &str, args: &[&str]) -> Run {
         let size: &[&str] = if args.contains(&"--size") { &[] } else { &["--size", "8x8"] };
         let validate: &[&str] = if args.contains(&"--validate") { &[] } else { &["--validate"] };
-        self.run(&[&["render", scene, "--device", DEVICE], size, validate, args].concat())
+        let told = args.iter().any(|arg| ["--rate", "--estimator", "supersample"].contains(arg));
+        let plain: &[&str] = if told { &[] } else { &["--rate", "full", "--estimator", "mis"] };
+        self.run(&[&["render", scene, "--device", DEVICE], size, validate, plain, args].concat())
     }
 
     fn exr(&self, name: &str) -> LinearImage {
@@ -157,6 +159,29 @@ fn every_documented_flag_works_or_is_not_supported_yet() {
     assert_eq!(folder.files(), ["stats.json"]);
 }
 
+/// What is not asked for is the best that goes with what is.
+#[test]
+fn defaults_follow_from_what_is_asked_for() {
+    let folder = Folder::new("defaults");
+    let cases: [(&[&str], [&str; 2]); 9] = [
+        (&[], ["bandwidth", "residual"]),
+        (&["--rate", "full"], ["full", "residual"]),
+        (&["--rate", "half"], ["half", "mis"]),
+        (&["--estimator", "brdf"], ["bandwidth", "brdf"]),
+        (&["--estimator", "cv"], ["full", "cv"]),
+        (&["--filter", "supersample"], ["full", "mis"]),
+        (&["--probes", "8"], ["bandwidth", "mis"]),
+        (&["--aov", "bandwidth"], ["bandwidth", "mis"]),
+        (&["--filter", "vmf8"], ["bandwidth", "residual"]),
+    ];
+    for (args, expected) in cases {
+        let common = ["render", "furnace", "--device", DEVICE, "--size", "8x8", "--samples", "4", "--stats", "stats.json"];
+        folder.run(&[&common[..], args].concat()).quiet();
+        let settings = &folder.json("stats.json")["settings"];
+        assert_eq!(["rate", "estimator"].map(|key| settings[key].as_str().unwrap()), expected, "{args:?}");
+    }
+}
+
 /// Wrong files, outputs and drivers are the rows of `tests/unbreakable`.
 #[test]
 fn wrong_arguments_end_with_2_and_leave_nothing() {
@@ -174,8 +199,8 @@ fn wrong_arguments_end_with_2_and_leave_nothing() {
         (&["furnace", "-o", "out"], &["--output", "out"]),
         (&["furnace", "--aov", "albedo"], &["--aov", "depth", "`albedo`"]),
         (&["furnace", "--aov", "depth,"], &["--aov"]),
-        (&["furnace", "--aov", "fit-error", "--samples", "2"], &["--aov fit-error", "preconvolved, cv or residual", "mis"]),
-        (&["furnace", "--aov", "decision", "--samples", "2"], &["--aov decision", "preconvolved, cv or residual", "mis"]),
+        (&["furnace", "--aov", "fit-error", "--estimator", "mis"], &["--aov fit-error", "preconvolved, cv or residual", "mis"]),
+        (&["furnace", "--aov", "decision", "--rate", "half"], &["--aov decision", "preconvolved, cv or residual", "mis"]),
         (&["furnace", "--aov", "residual", "--estimator", "preconvolved"], &["--aov residual", "cv or residual"]),
         (&["furnace", "--samples", "0"], &["2 to 65536", "got 0"]),
         (&["furnace", "--samples", "1"], &["2 to 65536", "got 1"]),

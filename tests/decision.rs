@@ -89,12 +89,14 @@ fn errors_are_those_of_the_fit_at_the_view_angle() {
 #[test]
 fn what_is_left_out_has_a_factor_of_one() {
     let world = scene();
-    let plain = layers(&world, residual(Rate::Full), &[Aov::FitError, Aov::Decision]);
+    // The rate is not full, but no sample is coarser than a pixel.
+    let everywhere = Config { lmax: 0, ..residual(Rate::Bandwidth) };
+    let plain = layers(&world, everywhere.clone(), &[Aov::FitError, Aov::Decision]);
     // Something is estimated at every sample, for itself.
     assert!(layer(&plain, "decision.Y").iter().zip(layer(&plain, "A")).all(|(d, a)| *d == if *a > 0.0 { 2.0 } else { -1.0 }));
     let negligible = quantile(&plain, 0.5);
     let errors = [negligible, 1.0, 2.0];
-    let image = layers(&world, Config { residual_errors: errors, ..residual(Rate::Full) }, &[Aov::Decision, Aov::Residual]);
+    let image = layers(&world, Config { residual_errors: errors, ..everywhere }, &[Aov::Decision, Aov::Residual]);
     let factor = ["R", "G", "B"].map(|c| layer(&image, &format!("residual.{c}")));
     let (mut left_out, mut estimated, mut noise) = (0, 0, 0);
     for (i, decision) in layer(&image, "decision.Y").iter().enumerate() {
@@ -157,7 +159,7 @@ fn area_lights_are_not_left_out() {
     let mut world = scene();
     world.environment.as_mut().unwrap().intensity = 0.2;
     world.lights.push(Light::Sphere { position: [1.5, 2.5, 2.0], radius: 0.4, radiance: [30.0; 3] });
-    let all = Config { residual_errors: [2.0; 3], ..residual(Rate::Full) };
+    let all = Config { residual_errors: [2.0; 3], lmax: 0, ..residual(Rate::Bandwidth) };
     let image = layers(&world, all, &[Aov::Decision]);
     let alone = layers(&world, Config { estimator: Estimator::Mis, directions: 256, ..residual(Rate::Full) }, &[]);
     let sum = |image: &LinearImage| layer(image, "G").iter().map(|v| f64::from(*v)).sum::<f64>();

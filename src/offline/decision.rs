@@ -1,6 +1,6 @@
 //! What residuals do at each sample of the last frame, and the errors of fits that they go by.
 
-use crate::config::{Config, Estimator};
+use crate::config::Config;
 use crate::offline::error::Result;
 use crate::offline::levels;
 use crate::offline::reference::MIN_COSINE;
@@ -77,7 +77,7 @@ pub fn decisions(session: &mut Session, config: &Config) -> Result<Vec<Decision>
             _ => Decision::Shaded(level),
         };
     }
-    if config.estimator == Estimator::Residual && session.sources().1 == 0 {
+    if config.residual_is_factor() && session.sources().1 == 0 {
         let negligible = config.residual_errors[0];
         for (found, error) in all.iter_mut().zip(fit_errors(session)?) {
             if *found != Decision::Background && error <= negligible {

@@ -1,6 +1,6 @@
 //! Pass 9: averages the shading samples of each output pixel; the background is black or the environment.
 
-use crate::config::{Config, Estimator};
+use crate::config::Config;
 use crate::error::Result;
 use crate::gpu::access::Access;
 use crate::gpu::buffer::Buffer;
@@ -49,7 +49,7 @@ pub(crate) struct Resolve(ComputePipeline);
 
 impl Resolve {
     pub fn new(p: &mut PassContext<'_, '_>, config: &Config) -> Result<Self> {
-        let [residual, ratio] = [config.estimator.has_residual(), config.estimator == Estimator::Residual].map(u32::from);
+        let [residual, ratio] = [config.estimator.has_residual(), config.residual_is_factor()].map(u32::from);
         let constants = [residual, ratio, config.samples_per_side];
         Ok(Self(ComputePipeline::new(p.build, p.modules, &INTERFACE, p.bridge, p.slots, &constants)?))
     }

@@ -124,7 +124,7 @@ impl Shade {
             Estimator::Lookup => 3,
             Estimator::Cv | Estimator::Residual => 4,
         };
-        let ratio = config.estimator == Estimator::Residual;
+        let ratio = config.residual_is_factor();
         let mut make = |lights| {
             let allocated = u32::from(config.allocation != Allocation::Constant);
             let (levelled, widened) = (u32::from(levelled), u32::from(config.widened()));

@@ -33,17 +33,18 @@ pub struct Args {
     /// Image size [default: the scene's, else 512x512]
     #[arg(long, value_name = "WxH", value_parser = size)]
     size: Option<[u32; 2]>,
-    /// Where to shade
-    #[arg(long, default_value = "full")]
-    rate: Rate,
+    /// Where to shade [default: bandwidth; full with --estimator preconvolved and cv and --filter supersample]
+    #[arg(long)]
+    rate: Option<Rate>,
     /// Directions a shaded pixel (64), their mean under a scene's settings.np_rule, and the budget that the scene asks for if not
     /// given; with --aa at --rate bandwidth a pixel has times its samples a side as many, shared by finer ones. With --filter
     /// supersample, sub-samples a pixel with a position and a direction each (4096)
     #[arg(long, value_name = "N")]
     samples: Option<u32>,
-    /// How directions are drawn
-    #[arg(long, default_value = "mis")]
-    estimator: Method,
+    /// How directions are drawn [default: residual; mis at other rates than bandwidth and full, and where the prediction of
+    /// bandwidth is asked for: with --probes, --spc, --literal eq4, eq8 and eq9, --aov bandwidth or spread, settings.np_rule]
+    #[arg(long)]
+    estimator: Option<Method>,
     /// Antialiasing samples a pixel: 1, 4 or 16
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = side)]
     aa: u32,
@@ -54,8 +55,8 @@ pub struct Args {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=256))]
     probes: Option<u32>,
     /// Samples that a predicted cycle gets: a number, or auto (2 at 64 samples, rising with their root)
-    #[arg(long, value_name = "X|auto", default_value = "auto", value_parser = samples_per_cycle)]
-    spc: SamplesPerCycle,
+    #[arg(long, value_name = "X|auto", value_parser = samples_per_cycle)]
+    spc: Option<SamplesPerCycle>,
     /// Seed of the sample points
     #[arg(long, value_name = "N", default_value_t = 0)]
     seed: u32,
@@ -87,7 +88,7 @@ pub struct Args {
     validate: bool,
 }
 
-#[derive(Clone, Copy, ValueEnum)]
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Rate {
     Full,
     Half,
@@ -111,7 +112,7 @@ enum Literal {
     Xu,
 }
 
-#[derive(Clone, Copy, ValueEnum)]
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Method {
     Mis,
     Brdf,
@@ -191,9 +192,25 @@ fn assignment(text: &str) -> std::result::Result<(String, String), String> {
 }
 
 impl Args {
+    /// Rate and estimator: those that are asked for, else the best that go with what is.
+    fn method(&self, base: &Config) -> (Rate, Method) {
+        let supersample = self.filter == "supersample";
+        let predicted = self.probes.is_some()
+            || self.spc.is_some()
+            || self.literal.iter().any(|form| *form != Literal::Xu)
+            || self.aov.iter().any(|layer| ["bandwidth", "spread"].contains(&layer.as_str()))
+            || base.allocation != Allocation::Constant;
+        let everywhere = supersample || matches!(self.estimator, Some(Method::Preconvolved | Method::Cv));
+        let rate = self.rate.unwrap_or(if everywhere { Rate::Full } else { Rate::Bandwidth });
+        let plain = supersample || predicted || !matches!(rate, Rate::Full | Rate::Bandwidth);
+        (rate, self.estimator.unwrap_or(if plain { Method::Mis } else { Method::Residual }))
+    }
+
     /// In the place of what the scene says in `base`.
     fn settings(&self, base: Config) -> Result<Settings> {
-        let rate = match self.rate {
+        let (rate, estimator) = self.method(&base);
+        let oracle = rate == Rate::Oracle;
+        let rate = match rate {
             Rate::Full => passband::Rate::Full,
             Rate::Half => passband::Rate::Uniform(1),
             Rate::Quarter => passband::Rate::Uniform(2),
@@ -201,7 +218,7 @@ impl Args {
             Rate::Luminance => passband::Rate::Luminance,
             Rate::Oracle => passband::Rate::Given,
         };
-        let estimator = match self.estimator {
+        let estimator = match estimator {
             Method::Mis => Estimator::Mis,
             Method::Brdf => Estimator::Brdf,
             Method::BrdfRandom => Estimator::BrdfRandom,
@@ -220,7 +237,7 @@ impl Args {
         let config = Config {
             rate,
             probes: self.probes.unwrap_or(base.probes),
-            samples_per_cycle: self.spc.0.or(literal(Literal::Eq9).then_some(1.0)),
+            samples_per_cycle: self.spc.and_then(|spc| spc.0).or(literal(Literal::Eq9).then_some(1.0)),
             combine: if literal(Literal::Eq4) { Combine::Literal } else { base.combine },
             allocation: if literal(Literal::Eq8) { Allocation::Equation8 } else { base.allocation },
             filter,
@@ -236,7 +253,7 @@ impl Args {
             ..base
         };
         Ok(Settings {
-            oracle: matches!(self.rate, Rate::Oracle),
+            oracle,
             seed: self.seed,
             aovs: self.aov.iter().map(|name| name.parse()).collect::<Result<_>>()?,
             reference: self.reference,
