@@ -249,7 +249,7 @@ fn fits_take_this_long() {
 }
 
 #[test]
-fn the_device_has_the_twins_mixtures() {
+fn the_device_has_mixtures_that_materials_bring() {
     let mut scene = world("sphere", 16, blinn_phong(), scenes::environment("constant", 16).unwrap());
     let first = scene.materials[0].clone();
     let with = |normal, roughness| Maps { normal, roughness, ..Maps::default() };

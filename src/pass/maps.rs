@@ -18,6 +18,7 @@ use crate::pass::brdf_map::{self, BrdfMap, Group, Layers, Place, Source};
 use crate::pass::cluster_moments::{self, ClusterMoments};
 use crate::pass::kept::{self, Mixtures, Table};
 use crate::pass::map_record::{Record, rule};
+use crate::pass::mixtures;
 use crate::pass::vmf_mips::{self, VmfMips};
 use crate::texture::classes::MAX_CLASSES;
 use crate::texture::{Class, Classes, Format, Slots};
@@ -26,11 +27,12 @@ use ash::vk;
 /// Classes that hold albedo, specular, normal and roughness maps, moments and cells, one bit each.
 pub(crate) type Uses = [u32; 6];
 
-/// The passes over the maps of materials: the last if the filter has clusters.
-pub(crate) type MomentPasses = (BrdfMap, VmfMips, Option<ClusterMoments>);
+/// The passes over the maps of materials: the third if the filter has clusters, the last if it has mixtures that are fitted a level at
+/// a time.
+pub(crate) type MomentPasses = (BrdfMap, VmfMips, Option<ClusterMoments>, Option<mixtures::Mixtures>);
 
 /// What their recordings need.
-pub(crate) type MomentWork = (brdf_map::Work, vmf_mips::Work, Option<cluster_moments::Work>);
+pub(crate) type MomentWork = (brdf_map::Work, vmf_mips::Work, Option<cluster_moments::Work>, Option<mixtures::Work>);
 
 /// What the `filter` pass reads.
 pub(crate) struct MapImages {
@@ -180,40 +182,69 @@ fn groups(
     (groups, places)
 }
 
-/// The images of `groups` that are filled from the host: of peaks or Gaussians, if the filter has some.
+/// Materials of group `i` with the first of their layers of cells, one of each.
+fn of_group(places: &[Option<GroupPlace>], i: usize) -> Vec<(usize, usize)> {
+    let here = |(number, place): (usize, &Option<GroupPlace>)| {
+        let place = place.as_ref().filter(|place| place.group == i && place.layers.cells > 0)?;
+        Some((number, place.first.cells))
+    };
+    let mut sources: Vec<_> = places.iter().enumerate().filter_map(here).collect();
+    sources.sort_by_key(|source| source.1);
+    sources.dedup_by_key(|source| source.1);
+    sources
+}
+
+/// Of each of `groups` whether the device fits its mixtures: not those of which materials bring some, nor more than it has room for.
+fn fitted(
+    build: &Build<'_>,
+    materials: &[Material],
+    groups: &[Group],
+    places: &[Option<GroupPlace>],
+    reading: &Reading<'_>,
+) -> Vec<bool> {
+    let pass = reading.passes.and_then(|passes| passes.3.as_ref());
+    let brought = |(i, _): &(usize, usize)| {
+        let known = materials.get(*i).and_then(|m| m.gaussians.as_ref());
+        known.is_some_and(|known| Some(known.fit()) == reading.filter.gaussians())
+    };
+    let of = |(i, group)| {
+        pass.is_some() && !of_group(places, i).iter().any(brought) && mixtures::fits(&build.cx.limits, group)
+    };
+    groups.iter().enumerate().map(of).collect()
+}
+
+/// The images of `groups` that are filled from the host: of peaks or of Gaussians, if the filter has some that it knows.
 fn filled(
     build: &mut Build<'_>,
     materials: &[Material],
     groups: &[Group],
     places: &[Option<GroupPlace>],
-    mixtures: &[Option<Mixtures>],
+    (mixtures, fitted): (&[Option<Mixtures>], &[bool]),
     filter: Filter,
 ) -> Result<Vec<Option<ImageUpload>>> {
     if !matches!(filter.storage(), Some(Storage::Peaks(_) | Storage::Gaussians(_))) {
         return Ok(groups.iter().map(|_| None).collect());
     }
-    let mut image = |(i, group): (usize, &Group)| {
-        if group.layers.cells == 0 {
+    let mut image = |(i, (group, fitted)): (usize, (&Group, &bool))| {
+        if group.layers.cells == 0 || *fitted {
             return Ok(None);
         }
-        let here = |(number, place): (usize, &Option<GroupPlace>)| {
-            let place = place.as_ref().filter(|place| place.group == i && place.layers.cells > 0)?;
-            Some((number, place.first.cells))
-        };
-        let mut sources: Vec<(usize, usize)> = places.iter().enumerate().filter_map(here).collect();
-        sources.sort_by_key(|source| source.1);
-        sources.dedup_by_key(|source| source.1);
+        let sources = of_group(places, i);
         let desc = brdf_map::coarser_desc(filter, group.size, group.layers.cells);
         let texels = if let Some(Storage::Peaks(count)) = filter.storage() {
             let sources: Vec<_> = sources.iter().filter_map(|(i, first)| Some((materials.get(*i)?, *first))).collect();
             kept::peaks(&desc, group.size, count, &sources)
         } else {
-            let sources: Vec<_> = sources.iter().filter_map(|(i, first)| Some((mixtures.get(*i)?.as_ref()?, *first))).collect();
-            kept::gaussians(&desc, &sources)
+            kept::gaussians(&desc, &mixed(mixtures, &sources))
         };
         Ok(Some(ImageUpload::new(build, desc, &texels)?))
     };
-    groups.iter().enumerate().map(&mut image).collect()
+    groups.iter().zip(fitted).enumerate().map(&mut image).collect()
+}
+
+/// Of materials in the numbers `sources` their mixtures, with the first of their layers.
+fn mixed<'a>(mixtures: &'a [Option<Mixtures>], sources: &[(usize, usize)]) -> Vec<(&'a Mixtures, usize)> {
+    sources.iter().filter_map(|(i, first)| Some((mixtures.get(*i)?.as_ref()?, *first))).collect()
 }
 
 /// Of each of `materials` what has to be known of it to make the cells of an object of it. Moments and cells of `groups` are behind
@@ -258,10 +289,16 @@ impl MapsUpload {
         }
         let table = Table::of(materials, &bases, reading.filter);
         let (groups, places) = groups(materials, &bases, sizes, &slots, &table.of, reading);
-        let of_group = |place: &Option<GroupPlace>| Some(groups.get(place.as_ref()?.group)?.size);
-        let of_groups: Vec<_> = places.iter().map(of_group).collect();
-        let mixtures = Mixtures::of(materials, &bases, &of_groups, reading.filter);
-        let filled = filled(build, materials, &groups, &places, &mixtures, reading.filter)?;
+        let fitted = fitted(build, materials, &groups, &places, reading);
+        let of_places = |place: &Option<GroupPlace>| {
+            let group = place.as_ref()?.group;
+            Some((groups.get(group)?.size, *fitted.get(group)?))
+        };
+        let of_places: Vec<_> = places.iter().map(of_places).collect();
+        let known = Mixtures::of(materials, &bases, &of_places, reading.filter);
+        let filled = filled(build, materials, &groups, &places, (&known, &fitted), reading.filter)?;
+        let starts = |(i, group)| Mixtures::starts(group, &mixed(&known, &of_group(&places, i)));
+        let starts: Vec<_> = groups.iter().enumerate().map(starts).collect();
         let camera = reading.bins == Bins::Camera;
         // Cells are behind the moments of their group, those of objects behind all.
         let firsts: Vec<_> = groups
@@ -282,8 +319,8 @@ impl MapsUpload {
         let shared = table
             .of
             .iter()
-            .zip(&mixtures)
-            .map(|([first, count], mixtures)| mixtures.as_ref().map_or([*first, *count, 0, 0], Mixtures::shared));
+            .zip(&known)
+            .map(|([first, count], known)| known.as_ref().map_or([*first, *count, 0, 0], Mixtures::shared));
         for ((((material, slots), base), place), shared) in materials.iter().zip(slots).zip(bases).zip(&places).zip(shared) {
             let (moments, cells) = (place.map(|p| p.moments.0), place.and_then(|p| p.cells.map(|c| c.0)));
             let mut slots = [slots.albedo, slots.specular, slots.normal, slots.roughness, moments, cells];
@@ -310,13 +347,15 @@ impl MapsUpload {
             moments.extend(filled.map(Made::Filled));
         }
         let work = match reading.passes.filter(|_| !groups.is_empty()) {
-            Some((map, mips, by_clusters)) => {
+            Some((map, mips, by_clusters, aligned)) => {
                 let images: Vec<_> = classes.iter().map(|c| &c.image).chain(moments.iter().map(Made::image)).collect();
                 let map = map.prepare(build, reading.samplers, &groups, &images, classes.len())?;
                 let mips = mips.prepare(build, &groups, &map)?;
                 let prepare = |pass: &ClusterMoments| pass.prepare(build, &groups, &images, &map, &clusters.buffer);
                 let by_clusters = by_clusters.as_ref().map(prepare).transpose()?;
-                Some((map, mips, by_clusters))
+                let prepare = |pass: &mixtures::Mixtures| pass.prepare(build, &groups, &images, &map, &starts);
+                let aligned = aligned.as_ref().map(prepare).transpose()?;
+                Some((map, mips, by_clusters, aligned))
             }
             None => None,
         };
