@@ -5,10 +5,26 @@
 const float FREE = 1e-3;
 const int HALVINGS = 4;
 
-// How far lobes are from some of these places, of these logarithms of variances: places over widths, and widths.
-vec4 apart(vec4 lobe, vec4 x, vec4 y, vec4 log_variance) {
-    vec4 off_x = lobe.x - x, off_y = lobe.y - y, wider = log(lobe.z) - log_variance;
-    return 0.5 * (off_x * off_x + off_y * off_y) * inversesqrt(lobe.z * exp(log_variance)) + 0.5 * wider * wider;
+// What a round over the lobes is for: the middles of all, how far lobes are from these, the furthest, halves, and the moments. One loop
+// does all, as drivers take long to compile many.
+const int MIDDLES = 0;
+const int OFF = 1;
+const int FURTHEST = 2;
+const int HALVES = 3;
+const int MOMENTS = HALVES + HALVINGS;
+
+// Places, logarithms of variances and one over their square roots.
+struct Middles {
+    vec4 x;
+    vec4 y;
+    vec4 logs;
+    vec4 narrow;
+};
+
+// How far a lobe is from each: places over widths, and widths.
+vec4 apart(vec4 lobe, float log_variance, Middles m) {
+    vec4 x = lobe.x - m.x, y = lobe.y - m.y, wider = log_variance - m.logs;
+    return 0.5 * (x * x + y * y) * inversesqrt(lobe.z) * m.narrow + 0.5 * wider * wider;
 }
 
 // 1 for the first of these that has next to nothing; nothing but 0 if all have something.
@@ -19,93 +35,60 @@ vec4 free_of(vec4 q) {
 
 // Moments from place `at`, by the components and with that division; false if there is nothing to divide.
 bool divide(Components c, vec4 free, out Sums s, out vec2 at) {
-    s = NOTHING;
     at = vec2(0.0);
-    vec4 mass = vec4(0.0), x = vec4(0.0), y = vec4(0.0), logs = vec4(0.0);
-    for (Walk w = walk_begin(); walk_there(w); walk_next(w)) {
-        vec4 lobe = walk_lobe(w), own = first_greatest(scores(c, lobe)) * lobe.w;
-        mass += own;
-        x += own * lobe.x;
-        y += own * lobe.y;
-        logs += own * log(lobe.z);
-    }
-    if (TOGETHER) {
-        put(0, mass);
-        put(1, x);
-        put(2, y);
-        put(3, logs);
-        add_up(4);
-        mass = got(0);
-        x = got(1);
-        y = got(2);
-        logs = got(3);
-    }
-    vec4 over = 1.0 / mix(vec4(1.0), mass, greaterThan(mass, vec4(0.0)));
-    x *= over;
-    y *= over;
-    logs *= over;
-
-    vec4 off = vec4(0.0);
-    for (Walk w = walk_begin(); walk_there(w); walk_next(w)) {
-        vec4 lobe = walk_lobe(w);
-        off += first_greatest(scores(c, lobe)) * lobe.w * apart(lobe, x, y, logs);
-    }
-    if (TOGETHER) {
-        put(0, off);
-        add_up(1);
-        off = got(0);
-    }
-    vec4 wide = first_greatest(off);
-    // Place and logarithm of the variance of its middle, and of its furthest lobe.
-    vec3 one = vec3(dot(wide, x), dot(wide, y), dot(wide, logs)), two = one;
-    float far = 0.0, mass_there = 0.0;
-    float number = 3e38;
-    for (Walk w = walk_begin(); walk_there(w); walk_next(w)) {
-        vec4 lobe = walk_lobe(w);
-        float its = dot(first_greatest(scores(c, lobe)), wide) * lobe.w * apart(lobe, one.xxxx, one.yyyy, one.zzzz).x;
-        if (its > far) {
-            far = its;
-            mass_there = lobe.w;
-            two = vec3(lobe.xy, log(lobe.z));
-            number = walk_number(w);
-        }
-    }
-    if (TOGETHER) {
-        furthest(far, mass_there, two, number);
-    }
-    if (dot(free, wide) > 0.0 || far <= 1e-6 * mass_there) {
-        return false;
-    }
-    at = one.xy;
-    for (int i = 0; i < HALVINGS; ++i) {
-        vec4 near_one = vec4(0.0), near_two = vec4(0.0);
+    Middles m = Middles(vec4(0.0), vec4(0.0), vec4(0.0), vec4(1.0));
+    vec4 wide = vec4(0.0);
+    float far = 0.0, mass = 0.0, number = 3e38;
+    vec3 furthest_lobe = vec3(0.0);
+    for (int round = MIDDLES; round <= MOMENTS; ++round) {
+        s = NOTHING;
+        vec4 other = vec4(0.0);
         for (Walk w = walk_begin(); walk_there(w); walk_next(w)) {
-            vec4 lobe = walk_lobe(w);
-            float own = dot(first_greatest(scores(c, lobe)), wide) * lobe.w;
-            vec4 to = apart(lobe, vec4(one.x, two.x, 0.0, 0.0), vec4(one.y, two.y, 0.0, 0.0), vec4(one.z, two.z, 0.0, 0.0));
-            vec4 its = own * vec4(1.0, lobe.xy, log(lobe.z));
-            near_one += to.y < to.x ? vec4(0.0) : its;
-            near_two += to.y < to.x ? its : vec4(0.0);
+            vec4 lobe = walk_lobe(w), shares = first_greatest(scores(c, lobe));
+            float log_variance = log(lobe.z), inside = dot(shares, wide);
+            vec4 off = apart(lobe, log_variance, m);
+            bool second = off.y < off.x;
+            if (round == FURTHEST && inside * lobe.w * dot(off, wide) > far) {
+                far = lobe.w * dot(off, wide);
+                mass = lobe.w;
+                furthest_lobe = vec3(lobe.xy, log_variance);
+                number = walk_number(w);
+            }
+            if (round == MOMENTS) {
+                shares = inside > 0.0 && second ? free : shares;
+            } else if (round >= HALVES) {
+                shares = inside * vec4(second ? 0.0 : 1.0, second ? 1.0 : 0.0, 0.0, 0.0);
+            }
+            add(s, shares, vec4(lobe.x - at.x), vec4(lobe.y - at.y), lobe);
+            other += shares * lobe.w * (round == OFF ? off : vec4(log_variance));
         }
-        if (TOGETHER) {
-            put(0, near_one);
-            put(1, near_two);
-            add_up(2);
-            near_one = got(0);
-            near_two = got(1);
+        all_of(s, other);
+        if (round == OFF) {
+            wide = first_greatest(other);
+            if (dot(free, wide) > 0.0) {
+                return false;
+            }
+        } else if (round == FURTHEST) {
+            if (TOGETHER) {
+                furthest(far, mass, furthest_lobe, number);
+            }
+            if (far <= 1e-6 * mass) {
+                return false;
+            }
+            at = vec2(dot(wide, m.x), dot(wide, m.y));
+            m.x = vec4(at.x, furthest_lobe.x, 0.0, 0.0);
+            m.y = vec4(at.y, furthest_lobe.y, 0.0, 0.0);
+            m.logs = vec4(dot(wide, m.logs), furthest_lobe.z, 0.0, 0.0);
+        } else if (round < MOMENTS) {
+            if (round >= HALVES && min(s.q.x, s.q.y) <= 0.0) {
+                return false;
+            }
+            vec4 over = 1.0 / mix(vec4(1.0), s.q, greaterThan(s.q, vec4(0.0)));
+            m.x = at.x + s.x * over;
+            m.y = at.y + s.y * over;
+            m.logs = other * over;
         }
-        if (near_one.x <= 0.0 || near_two.x <= 0.0) {
-            return false;
-        }
-        one = near_one.yzw / near_one.x;
-        two = near_two.yzw / near_two.x;
+        m.narrow = exp(-0.5 * m.logs);
     }
-    for (Walk w = walk_begin(); walk_there(w); walk_next(w)) {
-        vec4 lobe = walk_lobe(w), label = first_greatest(scores(c, lobe));
-        vec4 to = apart(lobe, vec4(one.x, two.x, 0.0, 0.0), vec4(one.y, two.y, 0.0, 0.0), vec4(one.z, two.z, 0.0, 0.0));
-        add(s, dot(label, wide) > 0.0 && to.y < to.x ? free : label, vec4(lobe.x - at.x), vec4(lobe.y - at.y), lobe);
-    }
-    float none = 0.0;
-    all_of(s, none);
     return true;
 }

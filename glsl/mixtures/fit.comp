@@ -168,7 +168,7 @@ void add(inout Sums s, vec4 shares, vec4 x, vec4 y, vec4 lobe) {
     s.yy += q * (y * y + lobe.z);
 }
 
-void all_of(inout Sums s, inout float other) {
+void all_of(inout Sums s, inout vec4 other) {
     if (TOGETHER) {
         put(0, s.q);
         put(1, s.x);
@@ -176,10 +176,10 @@ void all_of(inout Sums s, inout float other) {
         put(3, s.xx);
         put(4, s.xy);
         put(5, s.yy);
-        put(6, vec4(other, 0.0, 0.0, 0.0));
+        put(6, other);
         add_up(7);
         s = Sums(got(0), got(1), got(2), got(3), got(4), got(5));
-        other = got(6).x;
+        other = got(6);
     }
 }
 
@@ -206,8 +206,9 @@ Sums expectation(Components c, out float likelihood) {
         likelihood += lobe.w * its;
         add(s, shares, lobe.x - c.x, lobe.y - c.y, lobe);
     }
-    all_of(s, likelihood);
-    likelihood /= max(total_of(s.q), 1e-37);
+    vec4 all_likelihood = vec4(likelihood, 0.0, 0.0, 0.0);
+    all_of(s, all_likelihood);
+    likelihood = all_likelihood.x / max(total_of(s.q), 1e-37);
     return s;
 }
 
@@ -261,7 +262,7 @@ Sums moments(Components c, out vec4 normal_x, out vec4 normal_y) {
         normal_x += row_x * share;
         normal_y += row_y * share;
     }
-    float none = 0.0;
+    vec4 none = vec4(0.0);
     all_of(s, none);
     if (TOGETHER && upright == 0u) {
         put(0, normal_x);
