@@ -62,70 +62,97 @@ fn apart(found: &[[f64; 6]], expected: &[[f64; 6]]) -> f64 {
     (0..6).map(|k| differ(k) / scale(k).max(0.05 * mass)).fold(0.0, f64::max)
 }
 
+/// Whether one map is fitted as the twin has it: how many of its texels are otherwise, beyond `bound`, and how many there are.
+fn otherwise(session: &mut Session, scene: &World, number: usize, bound: f64) -> [usize; 2] {
+    let material = &scene.materials[number];
+    let twin = Moments::of(&material.surface(), Filter::Gmm, Division::default(), false).unwrap();
+    let (twin, layers) = (twin.lobes().unwrap(), fitted(session, number));
+    let mut offs = Vec::new();
+    for level in 0..twin.levels() {
+        assert_eq!(layers[0][level].0, twin.size(level), "{}", material.name);
+        for i in 0..layers[0][level].1.len() {
+            let expected = twin.texel(level, i).unwrap();
+            let expected = expected.as_chunks::<6>().0;
+            let moments = |k: usize| {
+                let [q, x, y, square] = layers[k][level].1[i];
+                let normal = layers.get(4 + k).map_or([0.0; 4], |layer| layer[level].1[i]);
+                [q, x, y, square, normal[0], normal[1]].map(f64::from)
+            };
+            let found: Vec<[f64; 6]> = (0..4).map(moments).collect();
+            // The sums over all Gaussians are those of all lobes, whatever is found.
+            let all = |of: &[[f64; 6]]| [of.iter().fold([0.0; 6], |sum, m| std::array::from_fn(|k| sum[k] + m[k]))];
+            let off = apart(&all(&found), &all(expected));
+            assert!(off < 1e-5, "{} level {level} texel {i}: {off}", material.name);
+            offs.push(apart(&found, expected));
+        }
+    }
+    offs.sort_by(f64::total_cmp);
+    let at = |share: f64| offs[((offs.len() - 1) as f64 * share) as usize];
+    let far = offs.iter().filter(|off| **off > bound).count();
+    let (median, most) = (at(0.5), at(0.99));
+    println!("{:10} {} texels: median {median:.1e}, 99 % {most:.1e}; {far} otherwise", material.name, offs.len());
+    [far, offs.len()]
+}
+
 #[test]
 fn the_device_fits_as_the_twin_does() {
     let with = |normal, roughness| Maps { normal, roughness, ..Maps::default() };
     let odd = [67, 45];
-    let scene = of(vec![
+    let small = vec![
         ("ggx", ggx(0.3, DVec3::ONE, DVec3::ZERO), with(normals(odd, 0.5), None)),
         ("rough", blinn_phong(), with(normals(odd, 0.2), roughness(odd, Roughness::Alpha, 0.1, 0.4))),
         ("sharp", ggx(0.02, DVec3::ONE, DVec3::ZERO), with(normals(odd, 0.3), None)),
-        ("two lobes", lobes(&[(0.7, 30.0), (-0.5, 60.0)]), with(normals([32; 2], 0.4), None)),
-        builtin("bumps", 128),
-        builtin("disk", 128),
-        builtin("cloth", 128),
-    ]);
-    let mut session = session(&scene);
-    for (number, material) in scene.materials.iter().enumerate() {
-        let twin = Moments::of(&material.surface(), Filter::Gmm, Division::default(), false).unwrap();
-        let twin = twin.lobes().unwrap();
-        let layers = fitted(&mut session, number);
-        let mut offs = Vec::new();
-        for level in 0..twin.levels() {
-            assert_eq!(layers[0][level].0, twin.size(level), "{}", material.name);
-            for i in 0..layers[0][level].1.len() {
-                let expected = twin.texel(level, i).unwrap();
-                let expected = expected.as_chunks::<6>().0;
-                let found: Vec<[f64; 6]> = (0..4)
-                    .map(|k| {
-                        let [q, x, y, square] = layers[k][level].1[i];
-                        let normal = layers.get(4 + k).map_or([0.0; 4], |layer| layer[level].1[i]);
-                        [q, x, y, square, normal[0], normal[1]].map(f64::from)
-                    })
-                    .collect();
-                // The sums over all Gaussians are those of all lobes, whatever is found.
-                let all = |of: &[[f64; 6]]| [of.iter().fold([0.0; 6], |sum, m| std::array::from_fn(|k| sum[k] + m[k]))];
-                let off = apart(&all(&found), &all(expected));
-                assert!(off < 1e-4, "{} level {level} texel {i}: {off}", material.name);
-                offs.push((apart(&found, expected), level));
-            }
+        ("two lobes", lobes(&[(0.7, 30.0), (-0.5, 60.0)]), with(normals(odd, 0.4), None)),
+    ];
+    let lone = |size| vec![("few texels", blinn_phong(), with(normals(size, 0.5), None))];
+    let of_maps = ["bumps", "disk", "dunes", "cloth", "flake"].map(|name| builtin(name, 128)).to_vec();
+    for materials in [small, lone([1, 1]), lone([5, 1]), lone([3, 40]), of_maps] {
+        let scene = of(materials);
+        let mut session = session(&scene);
+        for number in 0..scene.materials.len() {
+            let [far, all] = otherwise(&mut session, &scene, number, 1e-3);
+            // A component that is just worth its while in 64 bits may not be in 32: then all below differ.
+            assert!(far * 50 <= all, "{}: {far} of {all}", scene.materials[number].name);
         }
-        let count = offs.len();
-        offs.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let at = |share: f64| offs[((count - 1) as f64 * share) as usize].0;
-        let far = offs.iter().filter(|off| off.0 > 1e-2).count();
-        println!(
-            "{:10} {count} texels: median {:.1e}, 99 % {:.1e}, most {:.1e}; {far} otherwise",
-            material.name,
-            at(0.5),
-            at(0.99),
-            at(1.0)
-        );
+        assert_eq!(session.messages(), [""; 0]);
     }
+}
+
+#[test]
+fn maps_that_change_are_fitted_anew() {
+    let maps = |height| Maps { normal: normals([64, 32], height), ..Maps::default() };
+    let scenes = [0.3, 0.6].map(|height| of(vec![("ggx", ggx(0.2, DVec3::ONE, DVec3::ZERO), maps(height))]));
+    let [first, second] = scenes.each_ref().map(|scene| fitted(&mut session(scene), 0));
+    assert!(first != second);
+    let mut session = session(&scenes[0]);
+    // The same bits in every run.
+    assert!(fitted(&mut session, 0) == first);
+    let times = session.renew_materials(&scenes[1]).unwrap();
+    assert!(times.iter().any(|(name, _)| *name == "mixtures"), "{times:?}");
+    assert!(fitted(&mut session, 0) == second);
+    session.renew_materials(&scenes[0]).unwrap();
+    assert!(fitted(&mut session, 0) == first);
     assert_eq!(session.messages(), [""; 0]);
 }
 
 #[test]
 fn fits_on_the_device_take_this_long() {
-    for (name, side) in [("disk", 256), ("bumps", 256), ("bumps", 512), ("disk", 512), ("disk", 1024)] {
-        let (_, model, maps) = builtin(name, side.min(512));
-        let tiled = |texture: &std::sync::Arc<passband::Texture>| texture.clone();
-        let _ = tiled;
-        let scene = of(vec![(name, model, maps)]);
+    let waves = |side: u32| {
+        let maps = Maps {
+            normal: normals([side; 2], 0.5),
+            roughness: roughness([side; 2], Roughness::Alpha, 0.1, 0.4),
+            ..Maps::default()
+        };
+        ("waves", blinn_phong(), maps)
+    };
+    // The first has the driver compile.
+    for (material, side) in [(waves(16), 16), (builtin("disk", 256), 256), (waves(512), 512)] {
+        let name = material.0;
         let clock = Instant::now();
-        let session = session(&scene);
-        let all = clock.elapsed().as_secs_f64();
-        let times: Vec<_> = session.setup().iter().map(|(name, ms)| format!("{name} {ms:.0}")).collect();
-        println!("{name} {side}x{side}: {all:.2} s, of these in ms {}", times.join(", "));
+        let session = session(&of(vec![material]));
+        let seconds = clock.elapsed().as_secs_f64();
+        let (_, ms) = session.setup().iter().find(|(name, _)| *name == "mixtures").unwrap();
+        println!("{name} {side}x{side}: {ms:.0} ms of {seconds:.2} s");
+        assert!(*ms > 0.0);
     }
 }

@@ -9,6 +9,9 @@
 layout(local_size_x = 8, local_size_y = 8) in;
 // Whether a group fits a texel, or each of its invocations one.
 layout(constant_id = 0) const bool TOGETHER = false;
+// Texels from one that an invocation looks at to its next, and of how many in a row it adds up the moments at a time.
+layout(constant_id = 1) const int ACROSS = 1;
+layout(constant_id = 2) const int WIDE = 1;
 layout(set = 2, binding = 0, std430) readonly buffer Lobes {
     vec4 lobes[];
 };
@@ -37,9 +40,6 @@ const int SOFT_ROUNDS = 2;
 // Further fits are for at least as many lobes, and have to raise the mean logarithm of their likelihood by this.
 const int WORTH_LOBES = 16;
 const float WORTH = 0.3;
-// Texels of a row at a time where a group adds up all below one.
-const int WIDE = TOGETHER ? 4 : 1;
-const int ACROSS = TOGETHER ? 8 : 1;
 
 shared float parts[28 * 64];
 shared float sums[28];
@@ -342,7 +342,7 @@ void main() {
     }
     vec4 normal_x, normal_y;
     Sums found = moments(best, normal_x, normal_y);
-    if (!TOGETHER || lane == 0) {
+    if (lane == 0) {
         keep(found, normal_x, normal_y);
     }
 }

@@ -3,7 +3,6 @@
 use crate::config::Bins;
 use crate::distribution::Filter;
 use crate::distribution::effective::Rule;
-use crate::distribution::filter::Storage;
 use crate::error::{Error, Result};
 use crate::gpu::access::Access;
 use crate::gpu::buffer::Buffer;
@@ -13,15 +12,16 @@ use crate::gpu::retire::{Build, Retired};
 use crate::gpu::sampler::Samplers;
 use crate::gpu::upload::{BufferUpload, ImageUpload};
 use crate::material::Material;
-use crate::moments::{Base, BaseLobes, Parameter};
-use crate::pass::brdf_map::{self, BrdfMap, Group, Layers, Place, Source};
+use crate::moments::{Base, BaseLobes};
+use crate::pass::brdf_map::{self, BrdfMap, Group, Place};
 use crate::pass::cluster_moments::{self, ClusterMoments};
-use crate::pass::kept::{self, Mixtures, Table};
-use crate::pass::map_record::{Record, rule};
+use crate::pass::groups::{self, GroupPlace};
+use crate::pass::kept::{Mixtures, Table};
+use crate::pass::map_record::Record;
 use crate::pass::mixtures;
 use crate::pass::vmf_mips::{self, VmfMips};
 use crate::texture::classes::MAX_CLASSES;
-use crate::texture::{Class, Classes, Format, Slots};
+use crate::texture::{Class, Classes, Format};
 use ash::vk;
 
 /// Classes that hold albedo, specular, normal and roughness maps, moments and cells, one bit each.
@@ -150,103 +150,6 @@ pub(super) fn code(place: Option<Place>) -> u32 {
     place.map_or(0, |(class, layer)| (layer << 3 | class) as u32 + 1)
 }
 
-/// A material's group, the first of its layers there and how many there are.
-struct GroupPlace {
-    group: usize,
-    first: Layers,
-    layers: Layers,
-}
-
-/// The moments of `materials`, of which `bases` say what is filtered: one group for each size, and each material's place.
-/// Cells of objects are none of the group's.
-fn groups(
-    materials: &[Material],
-    bases: &[Option<Base>],
-    sizes: Vec<[u32; 2]>,
-    slots: &[Slots],
-    clusters: &[[u32; 2]],
-    reading: &Reading<'_>,
-) -> (Vec<Group>, Vec<Option<GroupPlace>>) {
-    let mut groups: Vec<_> = sizes.into_iter().map(Group::new).collect();
-    let mut place = |i: usize| {
-        let (material, base, slots, clusters) = (materials.get(i)?, (*bases.get(i)?)?, slots.get(i)?, clusters.get(i)?);
-        let group = brdf_map::fitting(&groups, base.size(material))?;
-        let roughness = base.roughness(material).and(slots.roughness);
-        let parameter = Parameter::of(&material.model);
-        let source = Source { normal: slots.normal, roughness, rule: rule(material), base, parameter, clusters: *clusters };
-        let layers = Layers::of(reading.filter, &base, clusters[1]);
-        let cells = if reading.bins == Bins::Camera { 0 } else { layers.cells };
-        Some(GroupPlace { group, first: groups.get_mut(group)?.place(source, Layers { cells, ..layers }), layers })
-    };
-    let places = (0..materials.len()).map(&mut place).collect();
-    (groups, places)
-}
-
-/// Materials of group `i` with the first of their layers of cells, one of each.
-fn of_group(places: &[Option<GroupPlace>], i: usize) -> Vec<(usize, usize)> {
-    let here = |(number, place): (usize, &Option<GroupPlace>)| {
-        let place = place.as_ref().filter(|place| place.group == i && place.layers.cells > 0)?;
-        Some((number, place.first.cells))
-    };
-    let mut sources: Vec<_> = places.iter().enumerate().filter_map(here).collect();
-    sources.sort_by_key(|source| source.1);
-    sources.dedup_by_key(|source| source.1);
-    sources
-}
-
-/// Of each of `groups` whether the device fits its mixtures: not those of which materials bring some, nor more than it has room for.
-fn fitted(
-    build: &Build<'_>,
-    materials: &[Material],
-    groups: &[Group],
-    places: &[Option<GroupPlace>],
-    reading: &Reading<'_>,
-) -> Vec<bool> {
-    let pass = reading.passes.and_then(|passes| passes.3.as_ref());
-    let brought = |(i, _): &(usize, usize)| {
-        let known = materials.get(*i).and_then(|m| m.gaussians.as_ref());
-        known.is_some_and(|known| Some(known.fit()) == reading.filter.gaussians())
-    };
-    let of = |(i, group)| {
-        pass.is_some() && !of_group(places, i).iter().any(brought) && mixtures::fits(&build.cx.limits, group)
-    };
-    groups.iter().enumerate().map(of).collect()
-}
-
-/// The images of `groups` that are filled from the host: of peaks or of Gaussians, if the filter has some that it knows.
-fn filled(
-    build: &mut Build<'_>,
-    materials: &[Material],
-    groups: &[Group],
-    places: &[Option<GroupPlace>],
-    (mixtures, fitted): (&[Option<Mixtures>], &[bool]),
-    filter: Filter,
-) -> Result<Vec<Option<ImageUpload>>> {
-    if !matches!(filter.storage(), Some(Storage::Peaks(_) | Storage::Gaussians(_))) {
-        return Ok(groups.iter().map(|_| None).collect());
-    }
-    let mut image = |(i, (group, fitted)): (usize, (&Group, &bool))| {
-        if group.layers.cells == 0 || *fitted {
-            return Ok(None);
-        }
-        let sources = of_group(places, i);
-        let desc = brdf_map::coarser_desc(filter, group.size, group.layers.cells);
-        let texels = if let Some(Storage::Peaks(count)) = filter.storage() {
-            let sources: Vec<_> = sources.iter().filter_map(|(i, first)| Some((materials.get(*i)?, *first))).collect();
-            kept::peaks(&desc, group.size, count, &sources)
-        } else {
-            kept::gaussians(&desc, &mixed(mixtures, &sources))
-        };
-        Ok(Some(ImageUpload::new(build, desc, &texels)?))
-    };
-    groups.iter().zip(fitted).enumerate().map(&mut image).collect()
-}
-
-/// Of materials in the numbers `sources` their mixtures, with the first of their layers.
-fn mixed<'a>(mixtures: &'a [Option<Mixtures>], sources: &[(usize, usize)]) -> Vec<(&'a Mixtures, usize)> {
-    sources.iter().filter_map(|(i, first)| Some((mixtures.get(*i)?.as_ref()?, *first))).collect()
-}
-
 /// Of each of `materials` what has to be known of it to make the cells of an object of it. Moments and cells of `groups` are behind
 /// `first` classes of textures.
 fn divided(
@@ -288,16 +191,16 @@ impl MapsUpload {
             classes.push(Class { size: [1, 1], format: Format::Half1, layers: vec![texel] });
         }
         let table = Table::of(materials, &bases, reading.filter);
-        let (groups, places) = groups(materials, &bases, sizes, &slots, &table.of, reading);
-        let fitted = fitted(build, materials, &groups, &places, reading);
+        let (groups, places) = groups::groups(materials, &bases, sizes, &slots, &table.of, reading);
+        let fitted = groups::fitted(build, materials, &groups, &places, reading);
         let of_places = |place: &Option<GroupPlace>| {
             let group = place.as_ref()?.group;
             Some((groups.get(group)?.size, *fitted.get(group)?))
         };
         let of_places: Vec<_> = places.iter().map(of_places).collect();
         let known = Mixtures::of(materials, &bases, &of_places, reading.filter);
-        let filled = filled(build, materials, &groups, &places, (&known, &fitted), reading.filter)?;
-        let starts = |(i, group)| Mixtures::starts(group, &mixed(&known, &of_group(&places, i)));
+        let filled = groups::filled(build, materials, &groups, &places, (&known, &fitted), reading.filter)?;
+        let starts = |(i, group)| Mixtures::starts(group, &groups::mixed(&known, &groups::of_group(&places, i)));
         let starts: Vec<_> = groups.iter().enumerate().map(starts).collect();
         let camera = reading.bins == Bins::Camera;
         // Cells are behind the moments of their group, those of objects behind all.

@@ -33,8 +33,7 @@ const fn interface<P: NoUninit>(name: &'static str, own: &'static [D]) -> Interf
 const LOBES: Interface = interface::<LobesPush>("mixtures_lobes", &[D::STORAGE_IMAGE, D::STORAGE_BUFFER]);
 const FIT: Interface =
     interface::<FitPush>("mixtures_fit", &[D::STORAGE_BUFFER, D::STORAGE_BUFFER, D::STORAGE_BUFFER, D::STORAGE_IMAGE]);
-const LABELS: Interface =
-    interface::<LabelsPush>("mixtures_labels", &[D::STORAGE_BUFFER, D::STORAGE_BUFFER, D::STORAGE_IMAGE]);
+const LABELS: Interface = interface::<LabelsPush>("mixtures_labels", &[D::STORAGE_BUFFER, D::STORAGE_BUFFER, D::STORAGE_IMAGE]);
 
 /// Shader interfaces, in the order in which they run.
 pub const INTERFACES: [Interface; 3] = [LOBES, FIT, LABELS];
@@ -166,10 +165,9 @@ pub(crate) fn fits(limits: &vk::PhysicalDeviceLimits, group: &Group) -> bool {
 impl Mixtures {
     /// For fits that all texels of a level have at once.
     pub fn new(p: &mut PassContext<'_, '_>, fit: Fit) -> Result<Self> {
-        let mut make =
-            |interface, constants: &[u32]| ComputePipeline::new(p.build, p.modules, interface, p.bridge, 0, constants);
+        let mut make = |interface, constants: &[u32]| ComputePipeline::new(p.build, p.modules, interface, p.bridge, 0, constants);
         let (lobes, labels) = (make(&LOBES, &[])?, make(&LABELS, &[])?);
-        Ok(Self { lobes, fit: [make(&FIT, &[0])?, make(&FIT, &[1])?], labels, strength: fit.strength as f32 })
+        Ok(Self { lobes, fit: [make(&FIT, &[0, 1, 1])?, make(&FIT, &[1, 8, 4])?], labels, strength: fit.strength as f32 })
     }
 
     /// What the recording needs: `starts` of the sources of `groups` that are fitted, whose mixtures' images are behind those of moments.
@@ -185,8 +183,12 @@ impl Mixtures {
         let places = BufferUpload::new(build, "places", storage, bytemuck::cast_slice(&below::places()))?;
         let (mut works, mut lobe_views) = (Vec::new(), Vec::new());
         for ((group, arrays), starts) in groups.iter().zip(&moments.arrays).zip(starts) {
-            let sources: Vec<_> =
-                group.sources.iter().zip(starts).filter_map(|(source, start)| Some(Fitting::of(source, start.as_ref()?))).collect();
+            let sources: Vec<_> = group
+                .sources
+                .iter()
+                .zip(starts)
+                .filter_map(|(source, start)| Some(Fitting::of(source, start.as_ref()?)))
+                .collect();
             let class = arrays.moments.0;
             let Some(image) = classes.get(class + 1).filter(|_| !sources.is_empty()) else { continue };
             let (_, vectors) = self::starts(&sizes(group.size));

@@ -13,6 +13,7 @@ pub mod environment_bandwidth;
 pub mod filter;
 pub(crate) mod fits;
 pub mod gbuffer;
+pub(crate) mod groups;
 pub(crate) mod kept;
 pub(crate) mod level;
 pub mod luminance;
