@@ -75,8 +75,9 @@ pub struct Material {
     /// The lobes that stand for it where light is looked up, if they are known; fitted when they are needed otherwise (seconds for a
     /// table).
     pub lobe_fit: Option<Arc<LobeFit>>,
-    /// The mixtures of these maps, if the filter has some and they are known; fitted when they are needed otherwise (seconds for a
-    /// large map), or if they are of another size.
+    /// The mixtures of these maps, if the filter has some and they are known. Otherwise, or if they are of another size, they are fitted
+    /// when they are needed: by the device, or on the host (seconds for a large map) those of [`crate::Filter::GmmUnaligned`] and those that
+    /// the device has no room for.
     pub gaussians: Option<Arc<Gaussians>>,
 }
 

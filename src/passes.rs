@@ -1,6 +1,7 @@
 //! The frame's passes, created from a configuration: only those that it records.
 
 use crate::config::{Bins, Config, Estimator, GBufferSource, Rate};
+use crate::distribution::alignment::Order;
 use crate::error::Result;
 use crate::frequency::allocation::Allocation;
 use crate::gpu::pipeline::BridgeLayouts;
@@ -8,7 +9,7 @@ use crate::gpu::retire::{Build, Retired};
 use crate::pass::gbuffer::GBuffer;
 use crate::pass::maps::MomentPasses;
 use crate::pass::{
-    PassContext, allocate, bandwidth, brdf_map, classify, cluster_moments, curvature, environment_bandwidth, luminance,
+    PassContext, allocate, bandwidth, brdf_map, classify, cluster_moments, curvature, environment_bandwidth, luminance, mixtures,
     prefilter, pyramid, residual_level, resolve, texture_space, tonemap, upsample, vmf_mips,
 };
 use ash::vk;
@@ -59,7 +60,9 @@ impl Passes {
                 true => {
                     let (map, mips) = (brdf_map::BrdfMap::new(&mut p, config)?, vmf_mips::VmfMips::new(&mut p, config)?);
                     let clusters = config.filter.has_clusters().then(|| cluster_moments::ClusterMoments::new(&mut p));
-                    Some((map, mips, clusters.transpose()?))
+                    let aligned = config.filter.gaussians().filter(|fit| fit.order == Order::Levels);
+                    let mixtures = aligned.map(|fit| mixtures::Mixtures::new(&mut p, fit)).transpose()?;
+                    Some((map, mips, clusters.transpose()?, mixtures))
                 }
                 false => None,
             },
@@ -85,10 +88,11 @@ impl Passes {
         if let Some(pass) = self.prefilter {
             pass.retire(bag);
         }
-        if let Some((map, mips, clusters)) = self.moments {
+        if let Some((map, mips, clusters, mixtures)) = self.moments {
             map.retire(bag);
             mips.retire(bag);
             clusters.into_iter().for_each(|pass| pass.retire(bag));
+            mixtures.into_iter().for_each(|pass| pass.retire(bag));
         }
         if let Some(pass) = self.texture_space {
             pass.retire(bag);

@@ -179,7 +179,7 @@ impl Renderer {
 
         // 2  Their materials at the pixel's scale, by cells of directions that may be each object's own.
         let objects = self.cells.as_ref();
-        if let (Some(pass), Some((_, mips, _)), Some(objects), GBufferInput::Draws(draws)) =
+        if let (Some(pass), Some((_, mips, ..)), Some(objects), GBufferInput::Draws(draws)) =
             (&passes.texture_space, &passes.moments, objects, inputs.gbuffer)
         {
             let world_from_view = inputs.view.world_from_view();

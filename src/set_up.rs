@@ -15,7 +15,7 @@ use crate::pass::gbuffer::{self, Draw};
 use crate::pass::maps::Reading;
 use crate::pass::materials::{MaterialsUpload, Uploading};
 use crate::pass::object_cells::{ObjectCells, Seats};
-use crate::pass::{PassContext, brdf_map, cluster_moments, filter, vmf_mips};
+use crate::pass::{PassContext, brdf_map, cluster_moments, filter, mixtures, vmf_mips};
 use crate::passes::layout;
 use crate::renderer::Renderer;
 use crate::sampling::LatLong;
@@ -91,12 +91,17 @@ impl Renderer {
         let work = upload.work();
         let fresh = upload.record(&mut rec, &mut bag);
         rec.end();
-        if let (Some((map, mips, clusters)), Some((of_map, of_mips, of_clusters))) = (&self.passes.moments, work) {
+        if let (Some((map, mips, clusters, mixtures)), Some((of_map, of_mips, of_clusters, of_mixtures))) =
+            (&self.passes.moments, work)
+        {
             map.record(&mut rec, &brdf_map::Io { maps: &fresh.maps }, &of_map);
             mips.record(&mut rec, &vmf_mips::Io { maps: &fresh.maps }, &of_map, &of_mips);
             for (pass, of_clusters) in clusters.iter().zip(of_clusters) {
                 pass.record(&mut rec, &cluster_moments::Io { maps: &fresh.maps }, &of_clusters);
                 of_clusters.retire(&mut bag);
+            }
+            for (pass, of_mixtures) in mixtures.iter().zip(of_mixtures) {
+                pass.record(&mut rec, &mixtures::Io { maps: &fresh.maps }, of_mixtures, &mut bag);
             }
             of_map.retire(&mut bag);
             of_mips.retire(&mut bag);
@@ -124,7 +129,7 @@ impl Renderer {
     /// share a number; [`Error::Allocation`], or as [`Self::new`] for more layers than an image has. The former room stays then.
     pub fn reserve_cells(&mut self, draws: &[Draw], memory: &mut dyn HostAllocator) -> Result<Retired> {
         let mut bag = Retired::default();
-        let (Bins::Camera, Some((_, mips, _))) = (self.config.bins, &self.passes.moments) else { return Ok(bag) };
+        let (Bins::Camera, Some((_, mips, ..))) = (self.config.bins, &self.passes.moments) else { return Ok(bag) };
         let Some((materials, _)) = &self.materials else {
             return Err(Error::CallOrder { called: "reserve_cells", before: "record_materials" });
         };

@@ -249,7 +249,7 @@ fn fits_take_this_long() {
 }
 
 #[test]
-fn the_device_has_the_twins_mixtures() {
+fn the_device_has_mixtures_that_materials_bring() {
     let mut scene = world("sphere", 16, blinn_phong(), scenes::environment("constant", 16).unwrap());
     let first = scene.materials[0].clone();
     let with = |normal, roughness| Maps { normal, roughness, ..Maps::default() };
@@ -268,40 +268,40 @@ fn the_device_has_the_twins_mixtures() {
             material
         })
         .collect();
-    for filter in [Filter::Gmm, Filter::GmmUnaligned] {
-        let config = Config { filter, ..config([8, 8], Estimator::Mis, 2) };
-        let options = Options { device: Some(DEVICE.into()), validate: true };
-        let headless = Headless::new(&options, &Requirements::of(&config)).unwrap();
-        let mut session = Session::new(headless, &scene, &config).unwrap();
-        for (number, material) in scene.materials.iter().enumerate() {
-            let name = &material.name;
-            let Some(twin) = Moments::of(&material.surface(), filter, Division::default(), false) else {
-                assert!(session.moments(number).unwrap().is_none() && name == "no map");
-                continue;
-            };
-            let twin = twin.lobes().unwrap();
-            let [_, layers] = session.moments(number).unwrap().unwrap();
-            assert_eq!(layers.len(), if name == "two lobes" { 8 } else { 4 });
-            let mut count = 0;
-            for level in 0..twin.levels() {
-                assert_eq!(layers[0][level].0, twin.size(level), "{name}");
-                for i in 0..layers[0][level].1.len() {
-                    let expected = twin.texel(level, i).unwrap();
-                    for (k, e) in expected.as_chunks::<6>().0.iter().enumerate() {
-                        let stored = layers[k][level].1[i];
-                        let normal = layers.get(4 + k).map_or([0.0; 2], |layer| [layer[level].1[i][0], layer[level].1[i][1]]);
-                        let stored = stored.into_iter().chain(normal);
-                        for (a, b) in stored.zip(e) {
-                            assert!((f64::from(a) - b).abs() <= 1e-6 * b.abs(), "{name} {level} {i} {k}: {a} for {b}");
-                        }
-                        count += 1;
+    // Of Gmm the device fits its own.
+    let filter = Filter::GmmUnaligned;
+    let config = Config { filter, ..config([8, 8], Estimator::Mis, 2) };
+    let options = Options { device: Some(DEVICE.into()), validate: true };
+    let headless = Headless::new(&options, &Requirements::of(&config)).unwrap();
+    let mut session = Session::new(headless, &scene, &config).unwrap();
+    for (number, material) in scene.materials.iter().enumerate() {
+        let name = &material.name;
+        let Some(twin) = Moments::of(&material.surface(), filter, Division::default(), false) else {
+            assert!(session.moments(number).unwrap().is_none() && name == "no map");
+            continue;
+        };
+        let twin = twin.lobes().unwrap();
+        let [_, layers] = session.moments(number).unwrap().unwrap();
+        assert_eq!(layers.len(), if name == "two lobes" { 8 } else { 4 });
+        let mut count = 0;
+        for level in 0..twin.levels() {
+            assert_eq!(layers[0][level].0, twin.size(level), "{name}");
+            for i in 0..layers[0][level].1.len() {
+                let expected = twin.texel(level, i).unwrap();
+                for (k, e) in expected.as_chunks::<6>().0.iter().enumerate() {
+                    let stored = layers[k][level].1[i];
+                    let normal = layers.get(4 + k).map_or([0.0; 2], |layer| [layer[level].1[i][0], layer[level].1[i][1]]);
+                    let stored = stored.into_iter().chain(normal);
+                    for (a, b) in stored.zip(e) {
+                        assert!((f64::from(a) - b).abs() <= 1e-6 * b.abs(), "{name} {level} {i} {k}: {a} for {b}");
                     }
+                    count += 1;
                 }
             }
-            assert!(count > 4000, "{count}");
         }
-        assert_eq!(session.messages(), [""; 0]);
+        assert!(count > 4000, "{count}");
     }
+    assert_eq!(session.messages(), [""; 0]);
 }
 
 #[test]

@@ -1,23 +1,22 @@
 //! In which order the mixtures of a map's texels are fitted, and what each learns of its neighbours (Tan et al. 2005, section 4.1): labels
 //! come from the texel above, from the coarsest level on, so that components of one number are alike wherever texels are averaged.
+//! [`Order::Levels`] is the f64 twin of the pass `mixtures`.
 
 use crate::distribution::BrdfMap;
+use crate::distribution::below::Below;
 use crate::distribution::clustering::{clustered, divided};
 use crate::distribution::clusters::Placed;
-use crate::distribution::expectation::{Components, GAUSSIANS, Prior, Sample, Sums, fit};
+use crate::distribution::expectation::{Components, GAUSSIANS, Prior, Rounds, Sample, Sums, fit};
 use crate::distribution::filtered::Area;
 use crate::distribution::stereographic;
-use crate::distribution::stored::covered;
-use crate::sampling::sobol;
 use crate::texture::{bilinear, halved};
 use glam::DVec2;
 use std::ops::Range;
 
-/// Rounds of a texel that starts from others', and of one that starts from nothing.
-const ROUNDS: [usize; 2] = [8, 24];
-
-/// Texels of the map that are looked at below one: all of them count once it is fitted.
-const LOOKED_AT: usize = 1024;
+/// Rounds of a texel that starts from others': as many in each, so that all are fitted alike wherever they are.
+const FROM_ABOVE: Rounds = Rounds { most: 8, until_settled: false };
+/// Of one that starts from nothing.
+const FROM_NOTHING: Rounds = Rounds { most: 24, until_settled: true };
 
 /// A component that has nothing of a texel has some of another's, if there are as many lobes below, and if that raises the mean
 /// logarithm of their likelihood by this.
@@ -61,8 +60,7 @@ pub(super) struct Samples {
     all: Vec<Sample>,
     /// The normal of each texel, if lobes are about other directions.
     normals: Vec<DVec2>,
-    /// Places in a texel that are looked at where it has more.
-    places: Vec<[f64; 2]>,
+    below: Below,
 }
 
 /// What is fitted of a texel: moments, and mass times the place of the normal, by component.
@@ -85,49 +83,26 @@ impl Samples {
         let all = map.lobes().iter().map(sample).collect();
         let count = map.lobes().len() / map.lobes_per_texel().max(1);
         let normals = (0..count).map_while(|i| map.normal(i)).map(stereographic::of).collect();
-        let places = (0..LOOKED_AT as u32).map(|i| sobol::point(i, 11).map(sobol::to_unit)).collect();
-        Self { size: map.size(), each: map.lobes_per_texel(), all, normals, places }
+        Self { size: map.size(), each: map.lobes_per_texel(), all, normals, below: Below::new(map.size()) }
     }
 
     fn texel(&self, i: usize) -> &[Sample] {
         self.all.get(i * self.each..(i + 1) * self.each).unwrap_or_default()
     }
 
-    /// Calls `see` for each texel below texel `i` of a level, with its share in it.
-    fn below(&self, size: [u32; 2], i: usize, mut see: impl FnMut(usize, f64)) {
-        let [x, y] = [i % size[0] as usize, i / size[0] as usize];
-        for (row, of_row) in covered(y, size[1], self.size[1]) {
-            for (column, of_column) in covered(x, size[0], self.size[0]) {
-                see(row * self.size[0] as usize + column, of_row * of_column);
-            }
-        }
-    }
-
     /// The lobes below a texel, or of many some.
     fn looked_at(&self, size: [u32; 2], i: usize) -> Vec<Sample> {
         let mut found = Vec::new();
-        let [w, h] = self.size.map(|side| side as usize);
-        if w * h <= LOOKED_AT * size[0] as usize * size[1] as usize {
-            self.below(size, i, |texel, share| {
-                found.extend(self.texel(texel).iter().map(|s| Sample { mass: s.mass * share, ..*s }));
-            });
-            return found;
-        }
-        let corner = [i % size[0] as usize, i / size[0] as usize].map(|c| c as f64);
-        for [x, y] in &self.places {
-            let column = ((corner[0] + x) * w as f64 / f64::from(size[0])) as usize;
-            let row = ((corner[1] + y) * h as f64 / f64::from(size[1])) as usize;
-            let share = 1.0 / LOOKED_AT as f64;
-            found
-                .extend(self.texel(row.min(h - 1) * w + column.min(w - 1)).iter().map(|s| Sample { mass: s.mass * share, ..*s }));
-        }
+        self.below.looked_at(size, i, |texel, share| {
+            found.extend(self.texel(texel).iter().map(|s| Sample { mass: s.mass * share, ..*s }));
+        });
         found
     }
 
     /// The moments of all lobes below a texel, by its components.
     fn moments(&self, size: [u32; 2], i: usize, components: &Components) -> Fitted {
         let mut fitted = Fitted { sums: Sums::ZERO, normals: [DVec2::ZERO; GAUSSIANS] };
-        self.below(size, i, |texel, share| {
+        self.below.all(size, i, |texel, share| {
             for s in self.texel(texel) {
                 let (shares, _) = components.shares(s);
                 for (k, of) in shares.into_iter().enumerate().filter(|(_, of)| *of > 1e-12) {
@@ -147,94 +122,108 @@ impl Samples {
         while let Some(size) = sizes.last().filter(|size| **size != [1, 1]) {
             sizes.push(halved(*size));
         }
-        // Coarsest first.
+        // Coarsest first. Above all of them is what is found from nothing.
+        let seed = Fitted { sums: coarsest(&self.looked_at([1, 1], 0)), normals: [DVec2::ZERO; GAUSSIANS] };
+        let mut above = Above { size: [1, 1], fitted: vec![seed] };
         let mut levels: Vec<Vec<Fitted>> = Vec::new();
         for (level, size) in sizes.iter().enumerate().skip(1).rev() {
-            let above = levels.last().zip(sizes.get(level + 1)).map(|(fitted, size)| Above { size: *size, fitted });
-            levels.push(self.level(how, *size, level as u32, above.as_ref(), threads));
+            let fitted = self.level(how, *size, level as u32, &above, threads);
+            levels.push(std::mem::replace(&mut above, Above { size: *size, fitted }).fitted);
         }
-        let above = levels.last().zip(sizes.get(1)).map(|(fitted, size)| Above { size: *size, fitted });
         let count = self.size[0] as usize * self.size[1] as usize;
         let own = |i: usize| {
-            let start = match (&above, how.order) {
-                (Some(above), Order::Levels | Order::Scanline) => above.between(self.size, i),
-                _ => clustered(self.texel(i), i as u32),
+            let start = match how.order {
+                Order::Levels | Order::Scanline => above.between(self.size, i),
+                Order::Alone => clustered(self.texel(i), i as u32),
             };
             let components = Components::of(&start, &Prior::default());
             self.texel(i).iter().map(|s| components.nearest(s) as u8).collect::<Vec<_>>()
         };
         let labels = in_parallel(count, threads, &|texels| texels.flat_map(own).collect());
+        levels.push(above.fitted);
         levels.reverse();
+        levels.pop();
         Aligned { labels, levels }
     }
 
-    fn level(&self, how: Fit, size: [u32; 2], level: u32, above: Option<&Above<'_>>, threads: usize) -> Vec<Fitted> {
+    fn level(&self, how: Fit, size: [u32; 2], level: u32, above: &Above, threads: usize) -> Vec<Fitted> {
         let count = size[0] as usize * size[1] as usize;
-        let fitted = |i: usize, start: &Sums, prior: &Prior, rounds: usize| {
+        let fitted = |i: usize, start: &Sums, prior: &Prior, rounds: Rounds| {
             let lobes = self.looked_at(size, i);
-            let (mut components, mut likelihood) = fit(start, &lobes, prior, rounds);
-            while lobes.len() >= WORTH_DIVIDING.0 {
-                let found = components.moments(lobes.iter()).0;
-                let Some(start) = divided(&found, &components, &lobes) else { break };
-                let (other, of_other) = fit(&start, &lobes, prior, rounds);
-                if of_other < likelihood + WORTH_DIVIDING.1 {
+            let (mut components, mut found, mut likelihood) = fit(start, &lobes, prior, rounds);
+            // Each time another component has a part of the others'.
+            for _ in 1..GAUSSIANS {
+                let start = (lobes.len() >= WORTH_DIVIDING.0).then(|| divided(&found, &components, &lobes)).flatten();
+                let Some(other) = start.map(|start| fit(&start, &lobes, prior, rounds)) else { break };
+                if other.2 < likelihood + WORTH_DIVIDING.1 {
                     break;
                 }
-                (components, likelihood) = (other, of_other);
+                (components, found, likelihood) = other;
             }
             self.moments(size, i, &components)
         };
-        let alone = |i: usize| {
-            let lobes = self.looked_at(size, i);
-            fitted(i, &clustered(&lobes, i as u32 ^ level << 27), &Prior::default(), ROUNDS[1])
+        let prior = |start: &Sums| {
+            let mut prior = Prior { strength: how.strength, ..Prior::default() };
+            prior.add(start, 1.0);
+            prior
         };
-        match (above, how.order) {
-            (None, Order::Levels | Order::Scanline) => (0..count).map(|i| self.coarsest(size, i)).collect(),
-            (Some(above), Order::Levels) => {
+        match how.order {
+            Order::Levels => {
                 let of = |i: usize| {
                     let start = above.between(size, i);
-                    let mut prior = Prior { strength: how.strength, ..Prior::default() };
-                    prior.add(&start, 1.0);
-                    fitted(i, &start, &prior, ROUNDS[0])
+                    fitted(i, &start, &prior(&start), FROM_ABOVE)
                 };
                 in_parallel(count, threads, &|texels| texels.map(of).collect())
             }
-            (Some(above), Order::Scanline) => {
+            Order::Scanline => {
                 let mut done: Vec<Fitted> = Vec::with_capacity(count);
                 for i in 0..count {
                     let start = above.parent(size, i).sums;
-                    let mut prior = Prior { strength: how.strength, ..Prior::default() };
-                    prior.add(&start, 1.0);
+                    let mut prior = prior(&start);
                     before(size, i).filter_map(|k| done.get(k)).for_each(|known| prior.add(&known.sums, 1.0));
-                    done.push(fitted(i, &start, &prior, ROUNDS[0]));
+                    done.push(fitted(i, &start, &prior, FROM_ABOVE));
                 }
                 done
             }
-            (_, Order::Alone) => in_parallel(count, threads, &|texels| texels.map(alone).collect()),
-        }
-    }
-
-    /// A texel without one above it: of several starts the most likely.
-    fn coarsest(&self, size: [u32; 2], i: usize) -> Fitted {
-        let lobes = self.looked_at(size, i);
-        let of = |start: u32| fit(&clustered(&lobes, start), &lobes, &Prior::default(), ROUNDS[1]);
-        let (mut best, mut likelihood) = of(0);
-        for other in (1..STARTS).map(of) {
-            if other.1 > likelihood {
-                (best, likelihood) = other;
+            Order::Alone => {
+                let of = |i: usize| {
+                    let start = clustered(&self.looked_at(size, i), i as u32 ^ level << 27);
+                    fitted(i, &start, &Prior::default(), FROM_NOTHING)
+                };
+                in_parallel(count, threads, &|texels| texels.map(of).collect())
             }
         }
-        self.moments(size, i, &best)
     }
+}
+
+/// The moments from which the coarsest level starts: of several fits to the lobes that it looks at the most likely.
+fn coarsest(lobes: &[Sample]) -> Sums {
+    let of = |start: u32| fit(&clustered(lobes, start), lobes, &Prior::default(), FROM_NOTHING);
+    let mut best = of(0);
+    for other in (1..STARTS).map(of) {
+        if other.2 > best.2 {
+            best = other;
+        }
+    }
+    best.0.moments(lobes.iter()).0
+}
+
+/// The same of a map alone.
+pub(super) fn seed(map: &BrdfMap, centre: DVec2, area: Area) -> Sums {
+    let mut lobes = Vec::new();
+    Below::new(map.size()).looked_at([1, 1], 0, |texel, share| {
+        lobes.extend(map.texel(texel).iter().map(|l| Sample::of(&Placed::of(l), centre, share * l.weight / area(l.kappa))));
+    });
+    coarsest(&lobes)
 }
 
 /// The level above one.
-struct Above<'a> {
+struct Above {
     size: [u32; 2],
-    fitted: &'a [Fitted],
+    fitted: Vec<Fitted>,
 }
 
-impl Above<'_> {
+impl Above {
     /// Its moments at the centre of texel `i` of a level below.
     fn between(&self, size: [u32; 2], i: usize) -> Sums {
         let [x, y] = [i % size[0] as usize, i / size[0] as usize].map(|c| c as f64 + 0.5);

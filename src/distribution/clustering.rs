@@ -1,5 +1,5 @@
 //! From where the fit of a texel's mixture starts, if not from its neighbours: clusters of its lobes, of which one may be divided for a
-//! component that has none.
+//! component that has none (`glsl/include/divide.glsl` is the twin of that).
 
 use crate::distribution::expectation::{Components, GAUSSIANS, Sample, Sums};
 use crate::sampling::sobol;
@@ -7,6 +7,9 @@ use glam::DVec2;
 
 /// Rounds in which lobes go to the nearest centre.
 const ROUNDS: usize = 8;
+
+/// The same where one component's are divided between two.
+const HALVINGS: usize = 4;
 
 /// A component of less of a texel's mass may have some of another's.
 const FREE: f64 = 1e-3;
@@ -70,11 +73,11 @@ pub(super) fn divided(found: &Sums, components: &Components, samples: &[Sample])
     let own = || samples.iter().zip(&labels).filter(|(_, label)| **label == wide).map(|(s, _)| s);
     let far = own().map(|s| (s.mass * apart(s, &middles[wide]), s));
     let (far, other) = far.reduce(|best, next| if next.0 > best.0 { next } else { best })?;
-    if free == wide || far <= 1e-9 * other.mass {
+    if free == wide || far <= 1e-6 * other.mass {
         return None;
     }
     let mut centres = [middles[wide], *other];
-    for _ in 0..ROUNDS {
+    for _ in 0..HALVINGS {
         let [one, two] = centres;
         let of = |side: bool| own().filter(move |s| (apart(s, &two) < apart(s, &one)) == side);
         centres = [middle(of(false))?, middle(of(true))?];
@@ -101,7 +104,7 @@ fn middle<'a>(samples: impl Iterator<Item = &'a Sample>) -> Option<Sample> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::distribution::expectation::{Prior, fit};
+    use crate::distribution::expectation::{Prior, Rounds, fit};
 
     #[test]
     fn a_component_without_mass_has_half_of_another() {
@@ -111,7 +114,8 @@ mod tests {
         samples.iter().for_each(|s| start.take(2, s, 1.0));
         let components = Components::of(&start, &Prior::default());
         let start = divided(&start, &components, &samples).unwrap();
-        let (found, likelihood) = fit(&start, &samples, &Prior::default(), 24);
+        let rounds = Rounds { most: 24, until_settled: true };
+        let (found, _, likelihood) = fit(&start, &samples, &Prior::default(), rounds);
         let (sums, _) = found.moments(samples.iter());
         let shares: Vec<_> = sums.0.iter().map(|m| m[0] / 40.0).collect();
         assert!((shares[0] - 0.5).abs() < 0.05 && (shares[2] - 0.5).abs() < 0.05, "{shares:?}");

@@ -19,7 +19,7 @@ const SOFT_ROUNDS: usize = 2;
 /// Components of less of a texel's mass than this are none.
 const LEAST_SHARE: f64 = 1e-9;
 
-/// The likelihood of a lobe, in logarithms, that ends a fit if it changes by less from one round to the next.
+/// The likelihood of a lobe, in logarithms, that may end a fit if it changes by less from one round to the next.
 const SETTLED: f64 = 1e-4;
 
 /// A lobe of some mass in the plane.
@@ -182,22 +182,31 @@ impl Components {
     }
 }
 
-/// The components of `samples`, from those of moments `start`; and the mean logarithm of the samples' likelihood.
-pub(super) fn fit(start: &Sums, samples: &[Sample], prior: &Prior, rounds: usize) -> (Components, f64) {
+/// How long a fit takes.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Rounds {
+    pub most: usize,
+    /// Whether it ends before where little changes.
+    pub until_settled: bool,
+}
+
+/// The components of `samples`, from those of moments `start`; the moments that they are of, and the mean logarithm of the samples'
+/// likelihood in the round before.
+pub(super) fn fit(start: &Sums, samples: &[Sample], prior: &Prior, rounds: Rounds) -> (Components, Sums, f64) {
     let of =
         |sums: &Sums, round: usize| Components::counting(sums, prior, if round < SOFT_ROUNDS { 1.0 } else { SAMPLES_A_LOBE });
     let mut components = of(start, 0);
-    let mut last = f64::NEG_INFINITY;
-    for round in 1..=rounds {
+    let (mut found, mut last) = (*start, f64::NEG_INFINITY);
+    for round in 1..=rounds.most {
         let (sums, likelihood) = components.moments(samples.iter());
         components = of(&sums, round);
         let settled = (likelihood - last).abs() < SETTLED && round > SOFT_ROUNDS;
-        last = likelihood;
-        if settled {
+        (found, last) = (sums, likelihood);
+        if settled && rounds.until_settled {
             break;
         }
     }
-    (components, last)
+    (components, found, last)
 }
 
 impl Sample {
@@ -211,6 +220,10 @@ mod tests {
     use super::*;
     use crate::distribution::clustering::clustered;
     use crate::sampling::sobol;
+
+    fn until_settled(most: usize) -> Rounds {
+        Rounds { most, until_settled: true }
+    }
 
     fn samples() -> Vec<Sample> {
         // Four heaps, of which two are at one place and differ in width.
@@ -226,7 +239,7 @@ mod tests {
     #[test]
     fn heaps_are_told_apart_by_place_and_width() {
         let samples = samples();
-        let (found, _) = fit(&clustered(&samples, 3), &samples, &Prior::default(), 64);
+        let (found, ..) = fit(&clustered(&samples, 3), &samples, &Prior::default(), until_settled(64));
         let (sums, _) = found.moments(samples.iter());
         let mut shares: Vec<_> = sums.0.iter().map(|m| m[0] / sums.mass()).collect();
         shares.sort_by(f64::total_cmp);
@@ -253,7 +266,7 @@ mod tests {
     fn what_is_alike_is_one() {
         let one = Sample { at: DVec2::new(0.1, -0.2), variance: 0.01, mass: 0.7 };
         let samples = [one; 9];
-        let (found, _) = fit(&clustered(&samples, 1), &samples, &Prior::default(), 8);
+        let (found, ..) = fit(&clustered(&samples, 1), &samples, &Prior::default(), until_settled(8));
         let (shares, _) = found.shares(&one);
         assert_eq!(shares.iter().filter(|s| **s > 0.0).count(), 1);
         assert_eq!(clustered(&[], 0), Sums::ZERO);
@@ -267,7 +280,7 @@ mod tests {
         neighbour.take(0, &Sample { at: DVec2::new(0.5, 0.1), variance: 0.1, mass: 2.0 }, 1.0);
         let mut prior = Prior { strength: 1.0, ..Prior::default() };
         prior.add(&neighbour, 1.0);
-        let (found, _) = fit(&start, &samples, &prior, 64);
+        let (found, ..) = fit(&start, &samples, &prior, until_settled(64));
         let (mean, inverse) = (found.all[0].mean, found.all[0].inverse);
         // Where the derivative of log likelihood and prior is 0.
         let own = samples.iter().map(|s| s.at).sum::<DVec2>() / samples.len() as f64;

@@ -6,7 +6,7 @@
 //! The paper has normals projected on their plane. In the stereographic plane, which angles do not change in, a round lobe is a
 //! round Gaussian at any slant, and lobes towards the horizon stay what they are.
 
-use crate::distribution::alignment::{Fit, Samples};
+use crate::distribution::alignment::{self, Fit, Samples};
 use crate::distribution::brdf_map::BrdfMap;
 use crate::distribution::clusters::{Decoded, Placed};
 use crate::distribution::expectation::GAUSSIANS;
@@ -49,6 +49,22 @@ pub(crate) struct Frame {
     pub floor: f64,
     /// The mean of 1 / kappa of the map's lobes.
     pub own: f64,
+}
+
+/// From where a device fits the mixtures of a map.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Start {
+    pub frame: Frame,
+    /// What the coarsest level starts from: of each Gaussian mass, mass times place, x and y, mass times mean products xx, xy, yy.
+    pub sums: [[f64; MOMENTS]; GAUSSIANS],
+}
+
+impl Start {
+    /// Of a map whose lobes have the masses weight over `area` of concentration.
+    pub fn of(map: &BrdfMap, area: Area) -> Self {
+        let frame = Frame::of(map);
+        Self { frame, sums: alignment::seed(map, frame.middle, area).0 }
+    }
 }
 
 impl Frame {

@@ -6,6 +6,7 @@
 //! multiplied by the lobe's weight, so that averages, and the hardware's own filters, are exact; it is decoded once, after them.
 
 pub mod alignment;
+pub(crate) mod below;
 pub mod brdf_map;
 pub mod chart;
 mod cluster_search;

@@ -15,7 +15,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// Changes with whatever changes the result for one map.
-const VERSION: &[u8] = b"passband gaussians 1";
+const VERSION: &[u8] = b"passband gaussians 2";
 
 /// The folder of the user's cache in which mixtures are kept; `None` on systems that have none.
 pub fn cache_folder() -> Option<PathBuf> {

@@ -1,5 +1,6 @@
 //! A world on a device: uploaded once, rendered frame by frame, read back.
 
+use crate::distribution::alignment::Order;
 use crate::distribution::{LobeFit, chart};
 use crate::gpu::access::Access;
 use crate::gpu::buffer::Buffer;
@@ -20,7 +21,7 @@ use crate::offline::window::{Window, near};
 use crate::offline::world::World;
 use crate::offline::{fit_cache, gaussians_cache, lobe_cache};
 use crate::pass::probe::Probe;
-use crate::pass::{PassContext, brdf_map, cluster_moments, vmf_mips};
+use crate::pass::{PassContext, brdf_map, cluster_moments, mixtures, vmf_mips};
 use crate::plan::Levels;
 use crate::renderer::Renderer;
 use crate::sampling::LatLong;
@@ -80,7 +81,8 @@ impl Session {
             };
             materials.iter_mut().filter(|m| m.keeps_model()).for_each(fit);
         }
-        if config.filter.gaussians().is_some() {
+        // Those of a level at a time are the device's.
+        if config.filter.gaussians().is_some_and(|fit| fit.order != Order::Levels) {
             let clock = Instant::now();
             let folder = gaussians_cache::cache_folder();
             let fit = |m: &mut crate::Material| m.gaussians = gaussians_cache::gaussians(m, config.filter, folder.as_deref());
@@ -378,7 +380,7 @@ impl Drop for Session {
 
 /// Times of the passes that made the materials' maps.
 fn of_maps(renderer: &Renderer) -> Result<SetupTimes> {
-    let known = |name: &&str| [brdf_map::NAME, vmf_mips::NAME, cluster_moments::NAME].contains(name);
+    let known = |name: &&str| [brdf_map::NAME, vmf_mips::NAME, cluster_moments::NAME, mixtures::NAME].contains(name);
     Ok(renderer.set_up_timings()?.unwrap_or_default().passes.into_iter().filter(|(name, _)| known(name)).collect())
 }
 

@@ -156,7 +156,8 @@ impl Group {
     }
 }
 
-/// What mips from level 1 on are, in an image of their own, or all levels of Gaussians: these and peaks are filled from the host.
+/// What mips from level 1 on are, in an image of their own, or all levels of Gaussians. Peaks are filled from the host, and Gaussians
+/// that it knows.
 pub(crate) fn coarser_desc(filter: Filter, size: [u32; 2], layers: usize) -> ImageDesc {
     let levels = size[0].max(size[1]).ilog2().max(1);
     let filled = vk::ImageUsageFlags::SAMPLED | vk::ImageUsageFlags::TRANSFER_SRC;
@@ -165,7 +166,7 @@ pub(crate) fn coarser_desc(filter: Filter, size: [u32; 2], layers: usize) -> Ima
     match filter.storage() {
         Some(Storage::Clusters) => ImageDesc { name: "clusters", format: vk::Format::R16G16B16A16_SFLOAT, ..desc },
         Some(Storage::Peaks(_)) => ImageDesc { name: "peaks", usage: filled, ..desc },
-        Some(Storage::Gaussians(_)) => ImageDesc { usage: filled, ..of_base },
+        Some(Storage::Gaussians(_)) => of_base,
         _ => desc,
     }
 }

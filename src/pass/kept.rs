@@ -4,12 +4,13 @@
 use crate::distribution::effective::Rule;
 use crate::distribution::expectation::GAUSSIANS;
 use crate::distribution::filtered::Area;
-use crate::distribution::gaussians::MOMENTS;
+use crate::distribution::gaussians::{MOMENTS, Start};
 use crate::distribution::peaks::Peaks;
 use crate::distribution::{BrdfMap, Clusters, Filter, Gaussians};
 use crate::gpu::image::ImageDesc;
 use crate::material::Material;
 use crate::moments::{self, Base, Parameter};
+use crate::pass::brdf_map::{Group, Layers, Source};
 use crate::pass::cluster_moments::Record;
 use bytemuck::Zeroable;
 use glam::{DVec2, DVec3};
@@ -101,35 +102,61 @@ pub(crate) fn peaks(desc: &ImageDesc, size: [u32; 2], count: usize, sources: &[(
     })
 }
 
-/// The mixtures of a material, and the map that they are of.
-pub(crate) struct Mixtures {
-    all: Arc<Gaussians>,
-    map: BrdfMap,
-    area: Area,
+/// The mixtures of a material.
+pub(crate) enum Mixtures {
+    /// With the map that they are of.
+    Known { all: Arc<Gaussians>, map: BrdfMap, area: Area },
+    /// Fitted by the device.
+    Fitted(Start),
 }
 
 impl Mixtures {
-    /// Of each of `materials`, of which `bases` say what is filtered, over maps of the sizes in `sizes`: none where the filter has
-    /// none. Materials of the same maps and lobes have the same mixtures.
-    pub fn of(materials: &[Material], bases: &[Option<Base>], sizes: &[Option<[u32; 2]>], filter: Filter) -> Vec<Option<Self>> {
+    /// Of each of `materials`, of which `bases` say what is filtered, over maps of the sizes in `places`, which the device fits or not:
+    /// none where the filter has none. Materials of the same maps and lobes have the same mixtures.
+    pub fn of(
+        materials: &[Material],
+        bases: &[Option<Base>],
+        places: &[Option<([u32; 2], bool)>],
+        filter: Filter,
+    ) -> Vec<Option<Self>> {
         let mut found: Vec<Option<Self>> = Vec::new();
-        for (i, ((material, base), size)) in materials.iter().zip(bases).zip(sizes).enumerate() {
+        for (i, ((material, base), place)) in materials.iter().zip(bases).zip(places).enumerate() {
             let same =
-                |k: &usize| bases.get(*k) == Some(base) && sizes.get(*k) == Some(size) && same_maps(&materials[*k], material);
-            let known = (0..i).find(same).and_then(|k| found.get(k)?.as_ref()).map(|known| known.all.clone());
-            let own = |base: &Base, size: [u32; 2]| {
-                let all = known.or_else(|| moments::gaussians(material, base, size, filter))?;
-                let map = BrdfMap::of(material, size, Rule::Exact).ok()?;
-                Some(Self { all, map, area: Parameter::of(&material.model).area() })
+                |k: &usize| bases.get(*k) == Some(base) && places.get(*k) == Some(place) && same_maps(&materials[*k], material);
+            let known = (0..i).find(same).and_then(|k| found.get(k)?.as_ref());
+            let own = |base: &Base, (size, on_device): ([u32; 2], bool)| {
+                let area = Parameter::of(&material.model).area();
+                let map = || BrdfMap::of(material, size, Rule::Exact).ok();
+                if filter.gaussians().is_none() || base.lobes().is_empty() {
+                    return None;
+                }
+                Some(match known {
+                    Some(Self::Fitted(start)) => Self::Fitted(*start),
+                    Some(Self::Known { all, .. }) => Self::Known { all: all.clone(), map: map()?, area },
+                    None if on_device => Self::Fitted(Start::of(&map()?, area)),
+                    None => Self::Known { all: moments::gaussians(material, base, size, filter)?, map: map()?, area },
+                })
             };
-            found.push(base.as_ref().zip(*size).and_then(|(base, size)| own(base, size)));
+            found.push(base.as_ref().zip(*place).and_then(|(base, place)| own(base, place)));
         }
         found
     }
 
+    /// Of sources that are fitted, as their first layers of mixtures and these have it, from what.
+    pub fn starts(group: &Group, here: &[(&Self, usize)]) -> Vec<Option<Start>> {
+        let of = |(_, first): &(Source, Layers)| {
+            let (mixtures, _) = here.iter().find(|(_, cells)| *cells == first.cells)?;
+            if let Self::Fitted(start) = mixtures { Some(*start) } else { None }
+        };
+        group.sources.iter().map(of).collect()
+    }
+
     /// What look-ups share, as `MapRecord::clusters` has it.
     pub fn shared(&self) -> [u32; 4] {
-        let frame = self.all.frame();
+        let frame = match self {
+            Self::Known { all, .. } => all.frame(),
+            Self::Fitted(start) => &start.frame,
+        };
         [frame.middle.x, frame.middle.y, frame.floor, frame.own].map(|v| (v as f32).to_bits())
     }
 }
@@ -138,7 +165,8 @@ impl Mixtures {
 /// their layers, a layer for each Gaussian and, where lobes are not about their normals, as many for these.
 pub(crate) fn gaussians(desc: &ImageDesc, sources: &[(&Mixtures, usize)]) -> Vec<u8> {
     by_level(desc, |level, area, layers| {
-        for (Mixtures { all, map, area: cosine }, first) in sources {
+        for (mixtures, first) in sources {
+            let Mixtures::Known { all, map, area: cosine } = mixtures else { continue };
             let normals = map.normal(0).is_some();
             for i in 0..area {
                 let Some(texel) = all.texel(map, *cosine, level, i) else { continue };

@@ -3,7 +3,6 @@
 use crate::config::Bins;
 use crate::distribution::Filter;
 use crate::distribution::effective::Rule;
-use crate::distribution::filter::Storage;
 use crate::error::{Error, Result};
 use crate::gpu::access::Access;
 use crate::gpu::buffer::Buffer;
@@ -13,24 +12,27 @@ use crate::gpu::retire::{Build, Retired};
 use crate::gpu::sampler::Samplers;
 use crate::gpu::upload::{BufferUpload, ImageUpload};
 use crate::material::Material;
-use crate::moments::{Base, BaseLobes, Parameter};
-use crate::pass::brdf_map::{self, BrdfMap, Group, Layers, Place, Source};
+use crate::moments::{Base, BaseLobes};
+use crate::pass::brdf_map::{self, BrdfMap, Group, Place};
 use crate::pass::cluster_moments::{self, ClusterMoments};
-use crate::pass::kept::{self, Mixtures, Table};
-use crate::pass::map_record::{Record, rule};
+use crate::pass::groups::{self, GroupPlace};
+use crate::pass::kept::{Mixtures, Table};
+use crate::pass::map_record::Record;
+use crate::pass::mixtures;
 use crate::pass::vmf_mips::{self, VmfMips};
 use crate::texture::classes::MAX_CLASSES;
-use crate::texture::{Class, Classes, Format, Slots};
+use crate::texture::{Class, Classes, Format};
 use ash::vk;
 
 /// Classes that hold albedo, specular, normal and roughness maps, moments and cells, one bit each.
 pub(crate) type Uses = [u32; 6];
 
-/// The passes over the maps of materials: the last if the filter has clusters.
-pub(crate) type MomentPasses = (BrdfMap, VmfMips, Option<ClusterMoments>);
+/// The passes over the maps of materials: the third if the filter has clusters, the last if it has mixtures that are fitted a level at
+/// a time.
+pub(crate) type MomentPasses = (BrdfMap, VmfMips, Option<ClusterMoments>, Option<mixtures::Mixtures>);
 
 /// What their recordings need.
-pub(crate) type MomentWork = (brdf_map::Work, vmf_mips::Work, Option<cluster_moments::Work>);
+pub(crate) type MomentWork = (brdf_map::Work, vmf_mips::Work, Option<cluster_moments::Work>, Option<mixtures::Work>);
 
 /// What the `filter` pass reads.
 pub(crate) struct MapImages {
@@ -148,74 +150,6 @@ pub(super) fn code(place: Option<Place>) -> u32 {
     place.map_or(0, |(class, layer)| (layer << 3 | class) as u32 + 1)
 }
 
-/// A material's group, the first of its layers there and how many there are.
-struct GroupPlace {
-    group: usize,
-    first: Layers,
-    layers: Layers,
-}
-
-/// The moments of `materials`, of which `bases` say what is filtered: one group for each size, and each material's place.
-/// Cells of objects are none of the group's.
-fn groups(
-    materials: &[Material],
-    bases: &[Option<Base>],
-    sizes: Vec<[u32; 2]>,
-    slots: &[Slots],
-    clusters: &[[u32; 2]],
-    reading: &Reading<'_>,
-) -> (Vec<Group>, Vec<Option<GroupPlace>>) {
-    let mut groups: Vec<_> = sizes.into_iter().map(Group::new).collect();
-    let mut place = |i: usize| {
-        let (material, base, slots, clusters) = (materials.get(i)?, (*bases.get(i)?)?, slots.get(i)?, clusters.get(i)?);
-        let group = brdf_map::fitting(&groups, base.size(material))?;
-        let roughness = base.roughness(material).and(slots.roughness);
-        let parameter = Parameter::of(&material.model);
-        let source = Source { normal: slots.normal, roughness, rule: rule(material), base, parameter, clusters: *clusters };
-        let layers = Layers::of(reading.filter, &base, clusters[1]);
-        let cells = if reading.bins == Bins::Camera { 0 } else { layers.cells };
-        Some(GroupPlace { group, first: groups.get_mut(group)?.place(source, Layers { cells, ..layers }), layers })
-    };
-    let places = (0..materials.len()).map(&mut place).collect();
-    (groups, places)
-}
-
-/// The images of `groups` that are filled from the host: of peaks or Gaussians, if the filter has some.
-fn filled(
-    build: &mut Build<'_>,
-    materials: &[Material],
-    groups: &[Group],
-    places: &[Option<GroupPlace>],
-    mixtures: &[Option<Mixtures>],
-    filter: Filter,
-) -> Result<Vec<Option<ImageUpload>>> {
-    if !matches!(filter.storage(), Some(Storage::Peaks(_) | Storage::Gaussians(_))) {
-        return Ok(groups.iter().map(|_| None).collect());
-    }
-    let mut image = |(i, group): (usize, &Group)| {
-        if group.layers.cells == 0 {
-            return Ok(None);
-        }
-        let here = |(number, place): (usize, &Option<GroupPlace>)| {
-            let place = place.as_ref().filter(|place| place.group == i && place.layers.cells > 0)?;
-            Some((number, place.first.cells))
-        };
-        let mut sources: Vec<(usize, usize)> = places.iter().enumerate().filter_map(here).collect();
-        sources.sort_by_key(|source| source.1);
-        sources.dedup_by_key(|source| source.1);
-        let desc = brdf_map::coarser_desc(filter, group.size, group.layers.cells);
-        let texels = if let Some(Storage::Peaks(count)) = filter.storage() {
-            let sources: Vec<_> = sources.iter().filter_map(|(i, first)| Some((materials.get(*i)?, *first))).collect();
-            kept::peaks(&desc, group.size, count, &sources)
-        } else {
-            let sources: Vec<_> = sources.iter().filter_map(|(i, first)| Some((mixtures.get(*i)?.as_ref()?, *first))).collect();
-            kept::gaussians(&desc, &sources)
-        };
-        Ok(Some(ImageUpload::new(build, desc, &texels)?))
-    };
-    groups.iter().enumerate().map(&mut image).collect()
-}
-
 /// Of each of `materials` what has to be known of it to make the cells of an object of it. Moments and cells of `groups` are behind
 /// `first` classes of textures.
 fn divided(
@@ -257,11 +191,17 @@ impl MapsUpload {
             classes.push(Class { size: [1, 1], format: Format::Half1, layers: vec![texel] });
         }
         let table = Table::of(materials, &bases, reading.filter);
-        let (groups, places) = groups(materials, &bases, sizes, &slots, &table.of, reading);
-        let of_group = |place: &Option<GroupPlace>| Some(groups.get(place.as_ref()?.group)?.size);
-        let of_groups: Vec<_> = places.iter().map(of_group).collect();
-        let mixtures = Mixtures::of(materials, &bases, &of_groups, reading.filter);
-        let filled = filled(build, materials, &groups, &places, &mixtures, reading.filter)?;
+        let (groups, places) = groups::groups(materials, &bases, sizes, &slots, &table.of, reading);
+        let fitted = groups::fitted(build, materials, &groups, &places, reading);
+        let of_places = |place: &Option<GroupPlace>| {
+            let group = place.as_ref()?.group;
+            Some((groups.get(group)?.size, *fitted.get(group)?))
+        };
+        let of_places: Vec<_> = places.iter().map(of_places).collect();
+        let known = Mixtures::of(materials, &bases, &of_places, reading.filter);
+        let filled = groups::filled(build, materials, &groups, &places, (&known, &fitted), reading.filter)?;
+        let starts = |(i, group)| Mixtures::starts(group, &groups::mixed(&known, &groups::of_group(&places, i)));
+        let starts: Vec<_> = groups.iter().enumerate().map(starts).collect();
         let camera = reading.bins == Bins::Camera;
         // Cells are behind the moments of their group, those of objects behind all.
         let firsts: Vec<_> = groups
@@ -282,8 +222,8 @@ impl MapsUpload {
         let shared = table
             .of
             .iter()
-            .zip(&mixtures)
-            .map(|([first, count], mixtures)| mixtures.as_ref().map_or([*first, *count, 0, 0], Mixtures::shared));
+            .zip(&known)
+            .map(|([first, count], known)| known.as_ref().map_or([*first, *count, 0, 0], Mixtures::shared));
         for ((((material, slots), base), place), shared) in materials.iter().zip(slots).zip(bases).zip(&places).zip(shared) {
             let (moments, cells) = (place.map(|p| p.moments.0), place.and_then(|p| p.cells.map(|c| c.0)));
             let mut slots = [slots.albedo, slots.specular, slots.normal, slots.roughness, moments, cells];
@@ -310,13 +250,15 @@ impl MapsUpload {
             moments.extend(filled.map(Made::Filled));
         }
         let work = match reading.passes.filter(|_| !groups.is_empty()) {
-            Some((map, mips, by_clusters)) => {
+            Some((map, mips, by_clusters, aligned)) => {
                 let images: Vec<_> = classes.iter().map(|c| &c.image).chain(moments.iter().map(Made::image)).collect();
                 let map = map.prepare(build, reading.samplers, &groups, &images, classes.len())?;
                 let mips = mips.prepare(build, &groups, &map)?;
                 let prepare = |pass: &ClusterMoments| pass.prepare(build, &groups, &images, &map, &clusters.buffer);
                 let by_clusters = by_clusters.as_ref().map(prepare).transpose()?;
-                Some((map, mips, by_clusters))
+                let prepare = |pass: &mixtures::Mixtures| pass.prepare(build, &groups, &images, &map, &starts);
+                let aligned = aligned.as_ref().map(prepare).transpose()?;
+                Some((map, mips, by_clusters, aligned))
             }
             None => None,
         };

@@ -13,12 +13,14 @@ pub mod environment_bandwidth;
 pub mod filter;
 pub(crate) mod fits;
 pub mod gbuffer;
+pub(crate) mod groups;
 pub(crate) mod kept;
 pub(crate) mod level;
 pub mod luminance;
 pub(crate) mod map_record;
 pub(crate) mod maps;
 pub mod materials;
+pub mod mixtures;
 pub mod modules;
 pub(crate) mod object_cells;
 pub mod prefilter;
@@ -71,5 +73,6 @@ pub fn interfaces() -> Vec<Interface> {
     all.extend(prefilter::INTERFACES);
     all.extend([brdf_map::INTERFACE, vmf_mips::CELLS, vmf_mips::INTERFACE]);
     all.extend([cluster_moments::INTERFACE, cluster_moments::LEVELS]);
+    all.extend(mixtures::INTERFACES);
     all
 }

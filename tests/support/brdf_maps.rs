@@ -1,4 +1,5 @@
 //! Maps of lobes on which filters are compared.
+#![allow(dead_code, reason = "each test file uses its part")]
 
 use glam::{DVec3, Vec3};
 use passband::distribution::BrdfMap;
@@ -21,13 +22,18 @@ fn middle(texture: &Texture, side: u32) -> Vec<Vec3> {
 
 /// The middle of the built-in map `name`: one lobe of the mapped concentration about the mapped normal, of `cloth` two.
 pub fn builtin(name: &str, side: u32) -> BrdfMap {
+    BrdfMap::of(&material(name, side), [side; 2], Rule::Exact).unwrap()
+}
+
+/// A material with it.
+pub fn material(name: &str, side: u32) -> Material {
     let normals = Image::builtin(name, Part::Normal).unwrap().normals(Encoding::Signed, true, 1.0).unwrap();
     let normals: Vec<_> = middle(&normals, side)
         .into_iter()
         .map(|n| n.truncate().extend((1.0 - n.truncate().length_squared()).max(0.0).sqrt()).normalize().to_array())
         .collect();
     let normal = Some(Arc::new(Texture::normals([side; 2], &normals).unwrap()));
-    let material = if name == "cloth" {
+    if name == "cloth" {
         let lobe = |x: f64| Lobe { mu: DVec3::new(x, 0.0, FRAC_1_SQRT_2), kappa: 128.0, weight: 1.0 };
         let model = Vmf::new(&[FRAC_1_SQRT_2, -FRAC_1_SQRT_2].map(lobe)).unwrap();
         Material::new(Model::Vmf(Arc::new(model)), Maps { normal, ..Maps::default() })
@@ -37,6 +43,5 @@ pub fn builtin(name: &str, side: u32) -> BrdfMap {
         let roughness = Some((Arc::new(Texture::scalar([side; 2], &kappa).unwrap()), Roughness::Kappa));
         let model = Model::Ggx(Ggx { alpha: 0.5, f0: DVec3::ONE, albedo: DVec3::ZERO });
         Material::new(model, Maps { normal, roughness, ..Maps::default() })
-    };
-    BrdfMap::of(&material, [side; 2], Rule::Exact).unwrap()
+    }
 }

@@ -9,7 +9,7 @@ noise: the image's own, as a rel. L2; less noise: without what it and the truth'
 energy: mean radiance over the truth's; preconv.: rel. L2 where the environment is looked up as it is convolved beforehand, without noise of its own";
 
 const COSTS: &str = "Costs on the device (Xu et al. 2017, table 1)
-set-up: brdf_map, vmf_mips and cluster_moments, on change; shading: filter and base (or shade), in every frame; 64x: one frame of filter point with 8
+set-up: brdf_map, vmf_mips, cluster_moments and mixtures, on change; shading: filter and base (or shade), in every frame; 64x: one frame of filter point with 8
 times the pixels a side; 64x over ...: its shading over the filter's, alone and with set-up; of LEAN's: shading over the filter lean's;
 ns, bytes: of set-up, and of the materials' memory beyond that with filter point (maps with mips, tables of more roughnesses), a texel";
 

@@ -119,7 +119,7 @@ pub struct Flicker {
 /// Milliseconds on the device.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Cost {
-    /// `brdf_map`, `vmf_mips` and `cluster_moments`, on change; absent without maps of the filter's own.
+    /// `brdf_map`, `vmf_mips`, `cluster_moments` and `mixtures`, on change; absent without maps of the filter's own.
     pub set_up_ms: Option<Summary>,
     /// `filter` and `base` (or `shade`), in every frame.
     pub shade_ms: Summary,
