@@ -51,7 +51,8 @@ impl Image {
     /// # Errors
     /// [`Error::Argument`] for another name.
     pub fn builtin(name: &str, part: Part) -> Result<Self> {
-        let ([width, height], texel) = match (name, part, surfaces::formula(name, part).or_else(|| reliefs::formula(name, part))) {
+        let ([width, height], texel) = match (name, part, surfaces::formula(name, part).or_else(|| reliefs::formula(name, part)))
+        {
             (_, _, Some(formula)) => formula,
             ("checker", Part::Colour, _) => {
                 let colour: Texel = Box::new(|x, y| DVec3::splat(if odd(x, y) { 0.7 } else { 0.05 }));
