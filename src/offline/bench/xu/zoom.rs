@@ -39,7 +39,7 @@ impl Preset {
     /// Consecutive frames of an animation.
     fn frames_moving(self) -> u32 {
         match self {
-            Self::Quick => 16,
+            Self::Quick => 8,
             Self::Full => 64,
         }
     }
@@ -180,7 +180,7 @@ mod tests {
     fn the_eye_goes_towards_the_disk_in_small_steps() {
         let mut disk = Scene::load("disk", &[]).unwrap().animated().unwrap();
         let all = cameras(&mut disk, Preset::Full);
-        assert_eq!((all.len(), cameras(&mut disk, Preset::Quick).as_slice()), (64, &all[..16]));
+        assert_eq!((all.len(), cameras(&mut disk, Preset::Quick).as_slice()), (64, &all[..8]));
         let distance = |camera: &Camera| (camera.position - camera.target).length();
         let steps: Vec<f64> = all.windows(2).map(|w| distance(&w[1]) / distance(&w[0])).collect();
         assert!(steps.iter().all(|s| (0.97..0.999).contains(s)), "{steps:?}");
