@@ -172,7 +172,9 @@ impl Stage<'_> {
             Light::Point => (Estimator::Brdf, 1),
             Light::Environment => (Estimator::Mis, directions),
         };
-        Config { frames_in_flight: 1, filter, extent, estimator, directions, ..self.config.clone() }
+        // Those that read texels look nothing up along a footprint (Tan et al. 2005, figure 7).
+        let anisotropy = if matches!(filter, Filter::Fournier4 | Filter::Fournier7) { 1 } else { self.config.anisotropy };
+        Config { frames_in_flight: 1, filter, extent, estimator, directions, anisotropy, ..self.config.clone() }
     }
 
     fn measure(&self, report: &mut Report, keep: &mut Option<&mut Keep<'_>>, progress: &mut Progress<'_>) -> Result<SceneReport> {

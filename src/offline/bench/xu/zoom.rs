@@ -20,14 +20,6 @@ use std::time::Instant;
 const FILTERS: [&str; 5] = ["clusters", "bruteforce", "gmm", "toksvig", "vmf8"];
 /// The most pixels a side of a frame; no more than stills have.
 const MOST_SIDE: u32 = 128;
-/// Joint sub-samples of each truth: under an environment directions are drawn, too.
-fn samples(light: Light) -> u32 {
-    match light {
-        Light::Point => 512,
-        Light::Environment => 4096,
-    }
-}
-
 /// Frames of one place that are averaged where lobes or directions are drawn.
 const DRAWN: u32 = 8;
 /// Directions of each of them under an environment that a material does not let be looked up.
@@ -53,6 +45,14 @@ pub(super) fn cameras(animated: &mut AnimatedWorld, preset: Preset) -> Vec<Camer
         animated.world().camera
     };
     (0..frames).map(camera).collect()
+}
+
+/// Joint sub-samples of each truth: under an environment directions are drawn, too.
+fn samples(light: Light) -> u32 {
+    match light {
+        Light::Point => 512,
+        Light::Environment => 4096,
+    }
 }
 
 /// A filter's frames, each the mean of two halves if anything is drawn.
