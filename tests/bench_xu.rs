@@ -222,7 +222,7 @@ fn the_suite_tan_takes_the_same_order() {
     let folder = Folder::new("tan");
     write(&folder, "small.toml", "{ ggx = { alpha = 0.15, f0 = 0.9, albedo = 0 } }");
     let still = std::fs::read_to_string(folder.0.join("small.toml")).unwrap();
-    let keys = "[{ frame = 0, position = [0, 1, 1.19] }, { frame = 3, position = [0, 0.95, 1.13] }]";
+    let keys = "[{ frame = 0, position = [0, 1, 1.19] }, { frame = 3, position = [0, 0.7, 0.83] }]";
     std::fs::write(folder.0.join("small.toml"), format!("{still}\n[animation]\nframes = 4\ncamera = {keys}\n")).unwrap();
     let filters = "toksvig,clusters,bruteforce,point";
     let args = ["small.toml", "--suite", "tan", "--filters", filters, "--size", "8x8", "--rounds", "1"];
@@ -245,9 +245,9 @@ fn the_suite_tan_takes_the_same_order() {
         assert_eq!(rows.iter().map(|r| r["filter"].clone()).collect::<Vec<_>>(), ["toksvig", "clusters", "bruteforce"]);
         for row in rows {
             let [flicker, noise, less, jod] = ["flicker", "noise", "less_noise", "jod"].map(|of| number(&row["found"][of]));
-            assert!(0.0 < less && less <= flicker && jod < 10.0 && (noise > 0.0) == (row["filter"] == "bruteforce"), "{row}");
+            assert!(0.0 < flicker && less <= flicker && jod < 10.0 && (noise > 0.0) == (row["filter"] == "bruteforce"), "{row}");
         }
-        assert!(number(&zoom["noise"]) < number(&rows[0]["found"]["flicker"]), "{zoom}");
+        assert!(number(&zoom["noise"]) > 0.0, "{zoom}");
     }
     for part in ["flicker, less noise, of clusters", "JOD of clusters", "on a 4-frame zoom", "4 frames of 8x8"] {
         assert!(text.contains(part), "{part} is not in\n{text}");

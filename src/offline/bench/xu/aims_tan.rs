@@ -10,6 +10,9 @@ const OURS: &str = "clusters";
 /// Every lobe kept: what no filter is better than but by chance.
 const FLOOR: &str = "bruteforce";
 
+/// All that aims name.
+pub(super) const COMPARED: [&str; 8] = ["fixed", "toksvig", "vmf8", "gmm", "gmm-unaligned", OURS, "fournier4", FLOOR];
+
 /// Planes, at any distance, on which it comes nearest.
 const NEAREST: [&str; 2] = ["checker-plane", "bumps-plane"];
 /// Carved, from any distance.
@@ -81,6 +84,12 @@ mod tests {
     use crate::offline::bench::table::Verdict;
     use crate::offline::bench::xu::cases::Light;
     use crate::offline::bench::xu::report::ZoomRow;
+
+    #[test]
+    fn filters_that_are_compared_are_filters() {
+        let names = Filter::ALL.map(Filter::name);
+        assert!(COMPARED.iter().all(|name| names.contains(name)), "{COMPARED:?}");
+    }
 
     #[test]
     fn zooms_are_judged_where_they_are_worst() {

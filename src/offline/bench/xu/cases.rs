@@ -88,7 +88,7 @@ const TAN: [Scale; 8] = [
     seen("disk", Seen::Frame(63), false),
     seen("armour", Seen::Times(1), false),
     seen("armour", Seen::Times(6), true),
-    seen("dunes", Seen::Times(1), true),
+    seen("dunes", Seen::Times(1), false),
     seen("dunes", Seen::Times(3), false),
     seen("dunes", Seen::Times(8), false),
 ];

@@ -45,6 +45,13 @@ impl Suite {
             Self::Tan => "tan",
         }
     }
+
+    /// What is compared where nothing else is asked for: all filters, of the quick preset of tan those of which it has aims.
+    pub fn filters(self, preset: Preset) -> Vec<Filter> {
+        let compared = |filter: &Filter| aims_tan::COMPARED.contains(&filter.name());
+        let all = Filter::ALL.into_iter();
+        if (self, preset) == (Self::Tan, Preset::Quick) { all.filter(compared).collect() } else { all.collect() }
+    }
 }
 
 /// What to run.
