@@ -1,6 +1,8 @@
 //! The prediction of bandwidth: the pass against its twin in f64, its units against measured spectra, and what the images shaded
 //! at its levels are worth.
 
+#[path = "support/chosen_device.rs"]
+mod chosen_device;
 #[path = "support/frames.rs"]
 mod frames;
 #[path = "support/prediction.rs"]

@@ -1,5 +1,7 @@
 //! `passband bench --suite residual` as users call it: what it measures of light that is looked up, and what it draws.
 
+#[path = "support/chosen_device.rs"]
+mod chosen_device;
 mod support {
     pub mod bench;
 }

@@ -220,21 +220,38 @@ fn motion_is_of_the_full_preset() {
 #[test]
 fn the_suite_tan_takes_the_same_order() {
     let folder = Folder::new("tan");
-    write(&folder, "small.toml", "{ vmf = [{ mu = [0, 0, 1], kappa = 128, weight = 0.5 }] }");
-    let (text, report) = folder.json(&[
-        "small.toml",
-        "--suite",
-        "tan",
-        "--filters",
-        "toksvig,clusters,bruteforce",
-        "--size",
-        "8x8",
-        "--rounds",
-        "1",
-    ]);
+    write(&folder, "small.toml", "{ ggx = { alpha = 0.15, f0 = 0.9, albedo = 0 } }");
+    let still = std::fs::read_to_string(folder.0.join("small.toml")).unwrap();
+    let keys = "[{ frame = 0, position = [0, 1, 1.19] }, { frame = 3, position = [0, 0.7, 0.83] }]";
+    std::fs::write(folder.0.join("small.toml"), format!("{still}\n[animation]\nframes = 4\ncamera = {keys}\n")).unwrap();
+    let filters = "toksvig,clusters,bruteforce,point";
+    let args = ["small.toml", "--suite", "tan", "--filters", filters, "--size", "8x8", "--rounds", "1"];
+    let (text, report) = folder.json(&args);
     assert!(report["suite"] == "tan" && text.contains("suite tan") && text.contains("of clusters over"), "{text}");
     // Of its own scenes' aims there is none.
     assert!(report["targets"].as_array().unwrap().iter().all(|t| !t["what"].as_str().unwrap().contains("LEAN")), "{text}");
+    // Microfacets are looked up as well as they are sampled.
+    for filter in ["toksvig", "clusters", "bruteforce"] {
+        let row = row(under(&report, "environment"), filter);
+        let [looked_up, sampled] = ["preconvolved", "errors"].map(|of| number(&row[of]["energy"]));
+        assert!((looked_up / sampled - 1.0).abs() < 0.2, "{row}");
+    }
+    // The camera moves: four frames of each of the filters that are compared so.
+    let zooms = report["zooms"].as_array().unwrap();
+    assert_eq!(zooms.len(), 2);
+    for zoom in zooms {
+        assert_eq!((&zoom["frames"], &zoom["extent"]), (&json!(4), &json!([8, 8])));
+        let rows = zoom["rows"].as_array().unwrap();
+        assert_eq!(rows.iter().map(|r| r["filter"].clone()).collect::<Vec<_>>(), ["toksvig", "clusters", "bruteforce"]);
+        for row in rows {
+            let [flicker, noise, less, jod] = ["flicker", "noise", "less_noise", "jod"].map(|of| number(&row["found"][of]));
+            assert!(0.0 < flicker && less <= flicker && jod < 10.0 && (noise > 0.0) == (row["filter"] == "bruteforce"), "{row}");
+        }
+        assert!(number(&zoom["noise"]) > 0.0, "{zoom}");
+    }
+    for part in ["flicker, less noise, of clusters", "JOD of clusters", "on a 4-frame zoom", "4 frames of 8x8"] {
+        assert!(text.contains(part), "{part} is not in\n{text}");
+    }
 }
 
 #[test]

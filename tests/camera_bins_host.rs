@@ -1,5 +1,7 @@
 //! Cells of directions in camera space as a host has them: room is reserved, draws are held against it, and nothing stays behind.
 
+#[path = "support/chosen_device.rs"]
+mod chosen_device;
 mod common;
 
 use common::assert_clean;

@@ -378,6 +378,9 @@ fn built_in_scenes_are_listed_and_render_without_a_validation_message() {
         "atlas-plane",
         "pillow",
         "hall",
+        "disk",
+        "armour",
+        "dunes",
     ];
     for name in names {
         let line = listing.lines().find(|line| line.split_whitespace().next() == Some(name));

@@ -1,6 +1,8 @@
 //! Many materials in one frame: each pixel is what its material alone would have made it.
 #![cfg(feature = "offline")]
 
+#[path = "support/chosen_device.rs"]
+mod chosen_device;
 mod support {
     pub mod frames;
 }

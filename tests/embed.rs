@@ -1,6 +1,8 @@
 //! The example host, as a test: a device, memory and G-buffer encoding of the host's own give the image that the
 //! command's own path gives.
 
+#[path = "support/chosen_device.rs"]
+mod chosen_device;
 mod common;
 
 use common::embed_minimal::memory::Buffer;

@@ -1,6 +1,8 @@
 //! Estimators agree with closed forms, with the reference and with each other, and frames are what their settings say.
 #![cfg(feature = "offline")]
 
+#[path = "support/chosen_device.rs"]
+mod chosen_device;
 mod support {
     pub mod frames;
     pub mod statistics;

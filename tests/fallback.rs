@@ -1,5 +1,7 @@
 //! Where most samples would be shaded anyway, the prediction from one block in sixteen turns the rest of it off.
 
+#[path = "support/chosen_device.rs"]
+mod chosen_device;
 mod common;
 #[path = "support/levels.rs"]
 mod support;

@@ -1,6 +1,8 @@
 //! Memory that cannot be had: whichever request fails, everything made so far is given back, the error names the
 //! resource, and what there was before still works. The validation layer reports objects that outlive the device.
 
+#[path = "support/chosen_device.rs"]
+mod chosen_device;
 mod common;
 
 use common::assert_clean;

@@ -1,5 +1,7 @@
 //! Lights beside the environment, against sums and midpoint quadrature in f64.
 
+#[path = "support/chosen_device.rs"]
+mod chosen_device;
 mod support {
     pub mod frames;
 }

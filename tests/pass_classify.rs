@@ -1,5 +1,7 @@
 //! `classify` lists every covered sample once, whatever the size, and nothing depends on the list's order.
 
+#[path = "support/chosen_device.rs"]
+mod chosen_device;
 mod common;
 
 use common::assert_clean;

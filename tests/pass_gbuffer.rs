@@ -1,5 +1,7 @@
 //! The rasterised G-buffer and the curvature pass against closed forms in f64.
 
+#[path = "support/chosen_device.rs"]
+mod chosen_device;
 mod common;
 
 use common::{assert_clean, headless};

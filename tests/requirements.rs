@@ -1,5 +1,7 @@
 //! What a device lacks is listed whole, what a host hands in wrongly is named, and a refused frame leaves no trace.
 
+#[path = "support/chosen_device.rs"]
+mod chosen_device;
 mod common;
 
 use common::assert_clean;

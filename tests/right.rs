@@ -1,6 +1,8 @@
 //! The image is right: full-rate frames against f64 quadrature that shares nothing with the GPU's path.
 #![cfg(feature = "offline")]
 
+#[path = "support/chosen_device.rs"]
+mod chosen_device;
 mod support {
     pub mod frames;
 }

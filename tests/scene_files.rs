@@ -394,7 +394,10 @@ fn builtin_scenes_resolve() {
             "microgeometry",
             "pillow",
             "tablecloth",
-            "hall"
+            "hall",
+            "disk",
+            "armour",
+            "dunes"
         ]
     );
     for (name, line) in names {

@@ -3,6 +3,8 @@
 //! The case is the one that a frame could get wrong: a dispatch writes a storage image that the next dispatch reads. Both
 //! are the crate's own tone mapping, from image to image, at host level.
 
+#[path = "support/chosen_device.rs"]
+mod chosen_device;
 mod common;
 
 use common::memory::Image;

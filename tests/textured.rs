@@ -1,6 +1,8 @@
 //! Textured surfaces are right: full-rate frames against f64 quadrature, with every kind of map on every kind of reflectance.
 #![cfg(feature = "offline")]
 
+#[path = "support/chosen_device.rs"]
+mod chosen_device;
 mod support {
     pub mod filters;
     pub mod frames;

@@ -1,5 +1,7 @@
 //! Renderers do not know of each other, and a resized one is as good as new.
 
+#[path = "support/chosen_device.rs"]
+mod chosen_device;
 mod common;
 
 use common::assert_clean;

@@ -22,7 +22,8 @@ layout(set = 2, binding = LOBES_BINDING) uniform usampler2DArray lobes_found;
 // Directions: local mean direction; cosine of the normal to the viewer, at least FACING.
 // Slopes, two entries each, in the tangent frame: mean, the density's height, weight.
 vec4 lobe_axis[LAYERS];
-// Directions: alpha squared (GGX), exponent (cosine powers) or concentration; D at the centre; weight; density there of what is drawn.
+// Directions: alpha squared (GGX), exponent (cosine powers) or concentration; D at the centre (of GGX times alpha^4); weight; density
+// there of what is drawn.
 // Slopes: inverse of the covariance; the covariance.
 vec4 lobe_shape[LAYERS];
 // Directions: local normal.

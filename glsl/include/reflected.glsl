@@ -76,7 +76,8 @@ ReflectedLobe reflected_found(Material m, Lobes l, uint i, vec3 wo) {
         centre = lobe_axis[i].xyz;
         float a = lobe_shape[i].x;
         kappa = ggx ? 2.0 / a : (cosine ? a + 2.0 : a);
-        peak = lobe_shape[i].y;
+        // Of GGX lobes.glsl keeps this times alpha^4.
+        peak = ggx ? kappa * (0.5 * INV_PI) : lobe_shape[i].y;
         weight = lobe_shape[i].z;
     }
     float cosine_to = dot(wo, centre);

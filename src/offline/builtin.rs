@@ -7,7 +7,7 @@ use crate::offline::mesh::{Mesh, shapes};
 use crate::sampling::LatLong;
 
 /// Names of the built-in meshes.
-pub const MESHES: [&str; 7] = ["sphere", "bumpy-sphere", "torus-knot", "plane", "cloth", "pillow", "cylinder"];
+pub const MESHES: [&str; 8] = ["sphere", "bumpy-sphere", "torus-knot", "plane", "disk", "cloth", "pillow", "cylinder"];
 
 /// Names of the built-in environments. `cosine-K` holds one frequency, of K radians a radian.
 pub const ENVIRONMENTS: [&str; 6] = ["sun-sky", "studio", "constant", "cosine-64", "cosine-128", "cosine-200"];
@@ -19,7 +19,9 @@ pub const DEFAULT_DETAIL: u32 = 256;
 pub const DEFAULT_WIDTH: u32 = 1024;
 
 /// The mesh `name`, with `detail` segments around the sphere and in proportion on the other shapes. All are centred, fit
-/// the unit sphere (`plane` and `cloth` are 2x2 in y = 0, facing +Y; `cylinder` is an upright tube without ends), are wound counter-clockwise and carry UVs.
+/// the unit sphere (`plane`,
+/// `disk` and `cloth` are 2x2 in y = 0, facing +Y; `cylinder` is an upright tube without ends), are wound counter-clockwise and
+/// carry UVs.
 ///
 /// # Errors
 /// [`Error::Argument`] for an unknown name or a `detail` outside 8 to 4096.
@@ -32,6 +34,7 @@ pub fn mesh(name: &str, detail: u32) -> Result<Mesh> {
         "bumpy-sphere" => shapes::bumpy_sphere(detail),
         "torus-knot" => shapes::torus_knot(detail),
         "plane" => shapes::plane(detail),
+        "disk" => shapes::disk(detail),
         "cloth" => shapes::cloth(detail),
         "pillow" => shapes::pillow(detail),
         "cylinder" => shapes::cylinder(detail),
@@ -110,7 +113,7 @@ mod tests {
 
     #[test]
     fn sheets_face_up() {
-        for name in ["plane", "cloth"] {
+        for name in ["plane", "disk", "cloth"] {
             let m = mesh(name, 64).unwrap();
             assert!(m.normals.iter().all(|n| n[1] > 0.5), "{name}");
             let [x, z] = [0, 2].map(|c| m.positions.iter().map(|p| p[c].abs()).fold(0.0, f32::max));

@@ -1,13 +1,11 @@
 //! Devices on which tests run: lavapipe unless chosen otherwise, always under validation with synchronization validation.
 #![allow(dead_code, reason = "each test file uses a part")]
 
-#[path = "../support/chosen_device.rs"]
-mod chosen_device;
 #[path = "../../examples/embed_minimal.rs"]
 pub mod embed_minimal;
 pub mod rig;
 
-pub use chosen_device::DEVICE;
+pub use crate::chosen_device::DEVICE;
 pub(crate) use embed_minimal::{device, memory};
 use passband::offline::headless::{Headless, Options};
 use passband::{Config, Requirements};

@@ -1,10 +1,7 @@
 //! `passband bench` in a folder of its own.
 #![allow(dead_code, reason = "each test file uses its part")]
 
-#[path = "chosen_device.rs"]
-mod chosen_device;
-
-use chosen_device::DEVICE;
+use crate::chosen_device::DEVICE;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};

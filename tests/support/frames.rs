@@ -1,10 +1,7 @@
 //! Worlds, frames on lavapipe under the validation layer, and their comparison with the f64 reference.
 #![allow(dead_code, reason = "each test file uses its part")]
 
-#[path = "chosen_device.rs"]
-mod chosen_device;
-
-use chosen_device::DEVICE;
+use crate::chosen_device::DEVICE;
 use glam::{DVec3, Mat4};
 use passband::offline::builtin;
 use passband::offline::headless::{Headless, Options};

@@ -1,10 +1,7 @@
 //! Random levels and surfaces, and what a frame decided on them, read back into the types of the f64 twin.
 #![allow(dead_code, reason = "each test file uses its part")]
 
-#[path = "chosen_device.rs"]
-mod chosen_device;
-
-use chosen_device::DEVICE;
+use crate::chosen_device::DEVICE;
 use glam::{DMat3, DVec3};
 use passband::frequency::reconstruction::{self as twin, Pyramid, Sample, Source, Surface};
 use passband::offline::headless::{Headless, Options};

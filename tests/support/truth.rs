@@ -1,9 +1,6 @@
 //! Images of more samples a pixel than a renderer takes.
 
-#[path = "chosen_device.rs"]
-mod chosen_device;
-
-use chosen_device::DEVICE;
+use crate::chosen_device::DEVICE;
 use passband::offline::bench::quality::Frame;
 use passband::offline::headless::{Headless, Options};
 use passband::offline::metrics::Picture;

@@ -40,7 +40,7 @@ pub struct Args {
     /// Timed frames of each variant [default: 5 of quick, 9 of full; of xu and tan 3 and 7]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=10_000))]
     rounds: Option<u32>,
-    /// Filters that xu and tan compare [default: all]
+    /// Filters that xu and tan compare [default: all; of quick tan those that it has aims of]
     #[arg(long, value_name = "NAME", value_delimiter = ',', value_parser = filter)]
     filters: Vec<Filter>,
     /// Image size [default: the scene's, else the preset's]
@@ -128,7 +128,7 @@ impl Args {
             rounds: self.rounds,
             extent: self.size,
             scenes: self.scenes.clone(),
-            filters: if self.filters.is_empty() { Filter::ALL.to_vec() } else { self.filters.clone() },
+            filters: if self.filters.is_empty() { suite.filters(self.preset()) } else { self.filters.clone() },
             device: self.options(),
             root: PathBuf::new(),
             cache: xu::cache_folder(),

@@ -2,7 +2,7 @@
 
 use super::table::{aims, aligned, skipped};
 use passband::offline::bench::statistics::{Ratio, Summary};
-use passband::offline::bench::xu::report::{Cost, Errors, Report, Row, SceneReport};
+use passband::offline::bench::xu::report::{Cost, Errors, Moving, Report, Row, SceneReport, Zoom};
 
 const ERRORS: &str = "Errors against the truth, over pixels that surfaces cover wholly
 noise: the image's own, as a rel. L2; less noise: without what it and the truth's add to the error in the mean;
@@ -13,6 +13,10 @@ set-up: brdf_map, vmf_mips, cluster_moments and mixtures, on change; shading: fi
 times the pixels a side; 64x over ...: its shading over the filter's, alone and with set-up; of LEAN's: shading over the filter lean's;
 ns, bytes: of set-up, and of the materials' memory beyond that with filter point (maps with mips, tables of more roughnesses), a texel";
 
+const ZOOMS: &str = "Consecutive frames of the scene's own camera against as many truths
+flicker: mean change of errors from frame to frame over the truth's mean; noise: the sequence's own; less noise: without what it and the truths'
+add, as squares; JOD: ColorVideoVDP at 30 frames a second, 10 is no difference";
+
 /// The whole report.
 pub fn text(report: &Report) -> String {
     let device = report.head.device.as_ref().map_or("none".into(), |d| format!("{} ({})", d.name, d.driver));
@@ -22,6 +26,10 @@ pub fn text(report: &Report) -> String {
     )];
     parts.push(ERRORS.into());
     parts.extend(report.scenes.iter().map(errors));
+    if !report.zooms.is_empty() {
+        parts.push(ZOOMS.into());
+        parts.extend(report.zooms.iter().map(zoom));
+    }
     parts.push(COSTS.into());
     parts.extend(report.scenes.iter().map(costs));
     if !report.targets.is_empty() {
@@ -78,6 +86,38 @@ fn errors(scene: &SceneReport) -> String {
     }
     text += &format!("\nfrom best to worst: {}", scene.order.join(", "));
     for row in &scene.rows {
+        text += &row.refused.as_ref().map_or(String::new(), |reason| format!("\n{}: {reason}", row.filter));
+    }
+    text
+}
+
+fn zoom(zoom: &Zoom) -> String {
+    let rows = zoom.rows.iter().map(|row| {
+        let of =
+            |f: fn(&Moving) -> f64, places: usize| row.found.as_ref().map_or(String::new(), |m| format!("{:.places$}", f(m)));
+        vec![
+            row.filter.into(),
+            of(|m| m.flicker, 4),
+            of(|m| m.noise, 4),
+            of(|m| m.less_noise, 4),
+            of(|m| m.jod, 2),
+            of(|m| m.color_error, 4),
+        ]
+    });
+    let header = ["filter", "flicker", "noise", "less noise", "JOD", "color"];
+    let mut text = format!(
+        "{}, {}, {} frames of {}x{}\n{}\ntruths: {} sub-samples a pixel, whose noise flickers by {:.4}; JOD {:.2} of their halves",
+        zoom.scene,
+        zoom.light.name(),
+        zoom.frames,
+        zoom.extent[0],
+        zoom.extent[1],
+        aligned(&header, 1, rows),
+        zoom.samples,
+        zoom.noise,
+        zoom.noise_jod
+    );
+    for row in &zoom.rows {
         text += &row.refused.as_ref().map_or(String::new(), |reason| format!("\n{}: {reason}", row.filter));
     }
     text

@@ -73,6 +73,17 @@ pub(crate) fn plane(detail: u32) -> Mesh {
     })
 }
 
+/// The circle in the square of [`plane`], with its texture coordinates: `detail` corners, an eighth as many rings.
+pub(crate) fn disk(detail: u32) -> Mesh {
+    let mut mesh = grid(detail, (detail / 8).max(1), |uv| {
+        let (sin, cos) = (uv.x * TAU).sin_cos();
+        (dvec3(cos, 0.0, -sin) * (1.0 - uv.y), DVec3::Y)
+    });
+    let coordinates = |[x, _, z]: &[f32; 3]| [0.5 + 0.5 * x, 0.5 - 0.5 * z];
+    mesh.uvs = mesh.positions.iter().map(coordinates).collect();
+    mesh
+}
+
 /// The square of [`plane`] in gentle waves of up to 0.1, `detail` cells a side.
 pub(crate) fn cloth(detail: u32) -> Mesh {
     let waves = [(0.05, dvec2(4.1, 1.6), 0.3), (0.03, dvec2(-2.3, 5.2), 1.7), (0.02, dvec2(7.4, -3.9), 2.6)];

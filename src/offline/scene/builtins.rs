@@ -1,7 +1,7 @@
 //! The scenes that need no other file, as they are in `scenes/`.
 
 /// Their names and texts.
-pub(super) const BUILTINS: [(&str, &str); 19] = [
+pub(super) const BUILTINS: [(&str, &str); 22] = [
     ("trio", include_str!("../../../scenes/trio.toml")),
     ("sphere", include_str!("../../../scenes/sphere.toml")),
     ("bumpy-sphere", include_str!("../../../scenes/bumpy-sphere.toml")),
@@ -21,4 +21,7 @@ pub(super) const BUILTINS: [(&str, &str); 19] = [
     ("pillow", include_str!("../../../scenes/pillow.toml")),
     ("tablecloth", include_str!("../../../scenes/tablecloth.toml")),
     ("hall", include_str!("../../../scenes/hall.toml")),
+    ("disk", include_str!("../../../scenes/disk.toml")),
+    ("armour", include_str!("../../../scenes/armour.toml")),
+    ("dunes", include_str!("../../../scenes/dunes.toml")),
 ];

@@ -3,7 +3,7 @@
 
 use crate::offline::error::{Error, Result};
 use crate::offline::texture::noise::{Noise, hash};
-use crate::offline::texture::{Image, Samples, surfaces};
+use crate::offline::texture::{Image, Samples, reliefs, surfaces};
 use glam::{DVec3, dvec3};
 use rayon::prelude::*;
 use std::f64::consts::{PI, TAU};
@@ -13,8 +13,10 @@ use std::path::PathBuf;
 pub const MAPS: [&str; 7] = ["checker", "cloth", "bumps", "disk", "dunes", "flake", "atlas"];
 
 /// Names of the built-in maps of normals.
-pub const NORMALS: [&str; 12] =
-    ["checker", "cloth", "bumps", "disk", "dunes", "flake", "atlas", "facets", "tiles", "bricks", "flutes", "scales"];
+pub const NORMALS: [&str; 15] = [
+    "checker", "cloth", "bumps", "disk", "dunes", "flake", "atlas", "facets", "tiles", "bricks", "flutes", "scales", "carving",
+    "armour", "sand",
+];
 
 /// Names of the built-in maps of concentrations.
 pub const CONCENTRATIONS: [&str; 13] =
@@ -43,12 +45,14 @@ impl Image {
     /// Scenes are made of the others: `facets` (1024x1024), polished plateaus between rough grooves, drawn anew in each texel;
     /// `tiles` (2048x2048), 16x16 glazed tiles; `bricks` (1024x1024); `flutes` of a column with polished veins (1024x1024);
     /// `scales` of a skin (2048x2048); `damask`, silk and gold threads (2048x1024), whose reflectance is `damask-sheen`;
-    /// `patina`, worn patches (671x457).
+    /// `patina`, worn patches (671x457); `carving`, a plate in relief (512x512); `armour`, hemispherical scales (512x480); `sand`,
+    /// dunes with ripples (1024x1024).
     ///
     /// # Errors
     /// [`Error::Argument`] for another name.
     pub fn builtin(name: &str, part: Part) -> Result<Self> {
-        let ([width, height], texel) = match (name, part, surfaces::formula(name, part)) {
+        let ([width, height], texel) = match (name, part, surfaces::formula(name, part).or_else(|| reliefs::formula(name, part)))
+        {
             (_, _, Some(formula)) => formula,
             ("checker", Part::Colour, _) => {
                 let colour: Texel = Box::new(|x, y| DVec3::splat(if odd(x, y) { 0.7 } else { 0.05 }));

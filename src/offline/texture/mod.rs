@@ -4,6 +4,7 @@ mod decode;
 mod formulas;
 mod heights;
 mod noise;
+mod reliefs;
 mod surfaces;
 
 use crate::offline::error::{At, Error, Result};

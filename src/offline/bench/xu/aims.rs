@@ -28,9 +28,14 @@ pub(super) fn worst(
     of: &dyn Fn(&SceneReport) -> Option<f64>,
 ) -> Option<Target> {
     let name = |scene: &SceneReport| format!("{} {}", scene.scene, scene.light.name());
-    let found: Vec<(String, SpeedUp)> =
-        scenes.iter().filter_map(|scene| Some((name(scene), SpeedUp { factor: of(scene)?, is: Is::Found }))).collect();
-    let mut sorted: Vec<(&str, SpeedUp)> = found.iter().map(|(name, found)| (name.as_str(), *found)).collect();
+    judged(scenes.iter().filter_map(|scene| Some((name(scene), of(scene)?))), what, aim, at_least)
+}
+
+/// An aim of what was `found`, by names, judged where it is worst.
+pub(super) fn judged(found: impl Iterator<Item = (String, f64)>, what: String, aim: f64, at_least: bool) -> Option<Target> {
+    let found: Vec<_> = found.collect();
+    let one = |factor: f64| SpeedUp { factor, is: Is::Found };
+    let mut sorted: Vec<(&str, SpeedUp)> = found.iter().map(|(name, factor)| (name.as_str(), one(*factor))).collect();
     sorted.sort_by(|a, b| a.1.factor.total_cmp(&b.1.factor));
     let worst = if at_least { sorted.first() } else { sorted.last() }?.1;
     Target::new(what, &sorted, worst, aim, at_least)

@@ -54,61 +54,85 @@ const CASES: [Case; 13] = [
     fetched("dragon-normals", "scenes/dragon-normals.toml", "assets/dragon_res3.ply.gz", "dragon"),
 ];
 
-/// A plane of [`TAN`] further away: its maps repeat so many times as often.
-struct Distance {
+/// A scene in one of its frames.
+pub(super) struct Shot {
+    pub scene: Scene,
+    pub frame: u32,
+}
+
+/// From where a scene of [`TAN`] is seen.
+enum Seen {
+    /// As in this frame of its animation.
+    Frame(u32),
+    /// From further away: its maps repeat so many times as often, and images stay as large.
+    Times(u32),
+}
+
+/// A scene of [`TAN`].
+struct Scale {
     scene: &'static str,
-    times: u32,
+    seen: Seen,
     /// Whether the quick preset has it.
     quick: bool,
 }
 
-const fn far(scene: &'static str, times: u32, quick: bool) -> Distance {
-    Distance { scene, times, quick }
+const fn seen(scene: &'static str, seen: Seen, quick: bool) -> Scale {
+    Scale { scene, seen, quick }
 }
 
-/// The kinds of surface of Tan et al. 2005: a carved disk in several zooms, armour of hemispherical scales at two resolutions, and
-/// dunes at several distances.
-const TAN: [Distance; 8] = [
-    far("disk-plane", 1, true),
-    far("disk-plane", 2, false),
-    far("disk-plane", 4, false),
-    far("bumps-plane", 1, true),
-    far("bumps-plane", 4, false),
-    far("dunes-plane", 1, true),
-    far("dunes-plane", 3, false),
-    far("dunes-plane", 8, false),
+/// The scenes of Tan et al. 2005: a carved disk from aside along a zoom, armour of hemispherical scales at two resolutions, and a
+/// desert from several distances.
+const TAN: [Scale; 8] = [
+    seen("disk", Seen::Frame(0), true),
+    seen("disk", Seen::Frame(32), false),
+    seen("disk", Seen::Frame(63), false),
+    seen("armour", Seen::Times(1), false),
+    seen("armour", Seen::Times(6), true),
+    seen("dunes", Seen::Times(1), false),
+    seen("dunes", Seen::Times(3), false),
+    seen("dunes", Seen::Times(8), false),
 ];
 
 /// The environment of scenes without one.
 const ENVIRONMENT: &str = "sun-sky";
 
 /// The scenes of the order's preset; those that lack files are `skipped`.
-pub(super) fn scenes(order: &Order, skipped: &mut Vec<Skipped>) -> Result<Vec<Scene>> {
-    let mut scenes = Vec::new();
+pub(super) fn shots(order: &Order, skipped: &mut Vec<Skipped>) -> Result<Vec<Shot>> {
+    let mut shots = Vec::new();
     if order.suite == Suite::Tan {
-        return TAN.iter().filter(|case| case.quick || order.preset == Preset::Full).map(Distance::scene).collect();
+        return TAN.iter().filter(|case| case.quick || order.preset == Preset::Full).map(Scale::shot).collect();
     }
     for case in CASES.iter().filter(|case| case.quick || order.preset == Preset::Full) {
         match case.file {
-            None => scenes.push(Scene::load(case.name, &[])?),
-            Some([scene, file, _]) if order.root.join(file).is_file() => {
-                scenes.push(Scene::load(&under(&order.root, scene), &[])?);
-            }
+            None => shots.push(Shot::of(case.name)?),
+            Some([scene, file, _]) if order.root.join(file).is_file() => shots.push(Shot::of(&under(&order.root, scene))?),
             Some([_, _, asset]) => skipped.push(Skipped { scene: case.name.into(), needs: vec![asset] }),
         }
     }
-    Ok(scenes)
+    Ok(shots)
 }
 
-impl Distance {
-    fn scene(&self) -> Result<Scene> {
-        let near = Scene::load(self.scene, &[])?;
-        if self.times == 1 {
-            return Ok(near);
+impl Shot {
+    /// The first frame of a scene file or of a built-in.
+    pub fn of(scene: &str) -> Result<Self> {
+        Ok(Self { scene: Scene::load(scene, &[])?, frame: 0 })
+    }
+}
+
+impl Scale {
+    fn shot(&self) -> Result<Shot> {
+        let near = Shot::of(self.scene)?;
+        match self.seen {
+            Seen::Frame(0) | Seen::Times(1) => Ok(near),
+            Seen::Frame(frame) => Ok(Shot { scene: near.scene.called(&format!("{} frame {frame}", self.scene)), frame }),
+            Seen::Times(times) => {
+                let [u, v] =
+                    near.scene.resolve()?.materials.first().map_or([1.0; 2], |m| m.maps.tiling.map(|t| t * times as f32));
+                let tiling = ("materials.surface.tiling".to_string(), format!("[{u}, {v}]"));
+                let scene = Scene::load(self.scene, &[tiling])?.called(&format!("{} x{times}", self.scene));
+                Ok(Shot { scene, frame: 0 })
+            }
         }
-        let [u, v] = near.resolve()?.materials.first().map_or([1.0; 2], |m| m.maps.tiling.map(|t| t * self.times as f32));
-        let tiling = ("materials.surface.tiling".to_string(), format!("[{u}, {v}]"));
-        Ok(Scene::load(self.scene, &[tiling])?.called(&format!("{} x{}", self.scene, self.times)))
     }
 }
 
@@ -170,10 +194,12 @@ mod tests {
         }
         let names: std::collections::BTreeSet<_> = CASES.iter().map(|c| c.name).collect();
         assert_eq!(names.len(), CASES.len());
-        let tiling = |case: &Distance| case.scene().unwrap().resolve().unwrap().materials[0].maps.tiling;
         for case in &TAN {
-            let near = far(case.scene, 1, true);
-            assert_eq!(tiling(case), tiling(&near).map(|t| t * case.times as f32), "{}", case.scene);
+            let [near, shot] = [Shot::of(case.scene), case.shot()].map(|shot| shot.unwrap());
+            let tiling = |shot: &Shot| shot.scene.resolve().unwrap().materials[0].maps.tiling;
+            let times = if let Seen::Times(times) = case.seen { times } else { 1 };
+            assert_eq!(tiling(&shot), tiling(&near).map(|t| t * times as f32), "{}", case.scene);
+            assert!(shot.frame < shot.scene.animated().unwrap().frames().unwrap_or(1), "{}", case.scene);
         }
     }
 }

@@ -10,6 +10,7 @@ mod stills;
 mod strips;
 mod times;
 mod truths;
+mod zoom;
 
 use crate::offline::bench::reference::Goal;
 use crate::offline::bench::report::{Head, Seconds};
@@ -17,12 +18,11 @@ use crate::offline::bench::suites::{Keep, Preset, Progress};
 use crate::offline::cache;
 use crate::offline::error::{Error, Result};
 use crate::offline::headless::{Headless, Options};
-use crate::offline::scene::Scene;
 use crate::offline::session::Session;
 use crate::offline::supersample;
 use crate::offline::world::World;
 use crate::{Config, Estimator, Filter, Requirements};
-use cases::Light;
+use cases::{Light, Shot};
 use report::{Report, Row, SceneReport, TruthReport};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -33,7 +33,7 @@ use truths::Truths;
 pub enum Suite {
     /// Of Xu et al. 2017, on the pinned inputs.
     Xu,
-    /// Of Tan et al. 2005: the same surfaces at several scales.
+    /// Of Tan et al. 2005: the same surfaces at several scales, and a zoom.
     Tan,
 }
 
@@ -44,6 +44,13 @@ impl Suite {
             Self::Xu => "xu",
             Self::Tan => "tan",
         }
+    }
+
+    /// What is compared where nothing else is asked for: all filters, of the quick preset of tan those of which it has aims.
+    pub fn filters(self, preset: Preset) -> Vec<Filter> {
+        let compared = |filter: &Filter| aims_tan::COMPARED.contains(&filter.name());
+        let all = Filter::ALL.into_iter();
+        if (self, preset) == (Self::Tan, Preset::Quick) { all.filter(compared).collect() } else { all.collect() }
     }
 }
 
@@ -112,21 +119,33 @@ pub fn run(order: &Order, mut keep: Option<&mut Keep<'_>>, progress: &mut Progre
     let mut report = Report {
         head: Head::new(order.suite.name(), order.preset.name(), order.rounds.unwrap_or(order.preset.frames_timed())),
         scenes: Vec::new(),
+        zooms: Vec::new(),
         skipped: Vec::new(),
         targets: Vec::new(),
         seconds: Seconds::default(),
     };
     // A name that is none is known before the work begins.
-    let own = order.scenes.iter().map(|name| Scene::load(name, &[])).collect::<Result<Vec<_>>>()?;
-    let scenes = if own.is_empty() { cases::scenes(order, &mut report.skipped)? } else { own };
-    for scene in scenes {
+    let own = order.scenes.iter().map(|name| Shot::of(name)).collect::<Result<Vec<_>>>()?;
+    let shots = if own.is_empty() { cases::shots(order, &mut report.skipped)? } else { own };
+    for Shot { scene, frame } in shots {
         progress(&format!("{}: loading", scene.name()), 0, 1);
-        let world = scene.resolve()?;
+        let mut animated = scene.animated()?;
+        // Once for all shots of an animation.
+        let moves = order.suite == Suite::Tan && frame == 0;
+        let cameras = if moves { zoom::cameras(&mut animated, order.preset) } else { Vec::new() };
+        animated.show(frame);
+        let world = animated.into_world();
         let config = scene.config(order.extent.unwrap_or(order.preset.still()));
         for light in Light::ALL {
             let stage = Stage { order, light, world: light.alone_in(&world)?, config: &config, rounds: report.head.rounds };
             let found = stage.measure(&mut report, &mut keep, progress)?;
             report.scenes.push(found);
+            if cameras.len() > 1 {
+                let name = format!("{}, {}", stage.world.name, light.name());
+                let mut told = |what: &str, done, total| progress(&format!("{name}: {what}"), done, total);
+                let zoom = zoom::measure(&stage, &cameras, &mut report.seconds.references, &mut told)?;
+                report.zooms.push(zoom);
+            }
         }
     }
     report.targets = match order.suite {
@@ -134,7 +153,7 @@ pub fn run(order: &Order, mut keep: Option<&mut Keep<'_>>, progress: &mut Progre
         Suite::Tan => Vec::new(),
     };
     // Those of clusters are of any scenes.
-    report.targets.extend(aims_tan::targets(&report.scenes));
+    report.targets.extend(aims_tan::targets(&report.scenes, &report.zooms));
     report.seconds.total = clock.elapsed().as_secs_f64();
     Ok(report)
 }
@@ -160,7 +179,9 @@ impl Stage<'_> {
             Light::Point => (Estimator::Brdf, 1),
             Light::Environment => (Estimator::Mis, directions),
         };
-        Config { frames_in_flight: 1, filter, extent, estimator, directions, ..self.config.clone() }
+        // Those that read texels look nothing up along a footprint (Tan et al. 2005, figure 7).
+        let anisotropy = if matches!(filter, Filter::Fournier4 | Filter::Fournier7) { 1 } else { self.config.anisotropy };
+        Config { frames_in_flight: 1, filter, extent, estimator, directions, anisotropy, ..self.config.clone() }
     }
 
     fn measure(&self, report: &mut Report, keep: &mut Option<&mut Keep<'_>>, progress: &mut Progress<'_>) -> Result<SceneReport> {

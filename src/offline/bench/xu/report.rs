@@ -17,6 +17,9 @@ pub struct Report {
     pub head: Head,
     /// Each scene under a point light, then under its environment.
     pub scenes: Vec<SceneReport>,
+    /// Scenes whose camera moves, in the suite tan.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub zooms: Vec<Zoom>,
     /// Scenes that lack files.
     pub skipped: Vec<Skipped>,
     /// What was aimed at, as far as it was measured.
@@ -116,6 +119,53 @@ pub struct Flicker {
     pub orbit: f64,
 }
 
+/// Consecutive frames of one scene under one light, beside as many truths.
+#[derive(Clone, Debug, Serialize)]
+pub struct Zoom {
+    /// The scene file's stem or the built-in's name.
+    pub scene: String,
+    /// What shines.
+    pub light: Light,
+    /// Pixels of a frame.
+    pub extent: [u32; 2],
+    /// How many.
+    pub frames: usize,
+    /// Joint sub-samples a pixel of each truth.
+    pub samples: u64,
+    /// The flicker that the noise of truths alone makes.
+    pub noise: f64,
+    /// JOD of one half of the truths' sub-samples against the other: of twice their noise.
+    pub noise_jod: f64,
+    /// Every filter.
+    pub rows: Vec<ZoomRow>,
+}
+
+/// One filter along a zoom.
+#[derive(Clone, Debug, Serialize)]
+pub struct ZoomRow {
+    /// As `--filter` names it.
+    pub filter: &'static str,
+    /// Why there is nothing, if the filter does not take a material.
+    pub refused: Option<String>,
+    /// What was found.
+    pub found: Option<Moving>,
+}
+
+/// How a sequence differs from its truths.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Moving {
+    /// As [`Metrics::flicker`].
+    pub flicker: f64,
+    /// The flicker of the sequence's own noise; 0 where nothing is drawn.
+    pub noise: f64,
+    /// `flicker` without what the noise of sequence and truths adds to it, as squares: independent normal differences add up so.
+    pub less_noise: f64,
+    /// As [`Metrics::jod`].
+    pub jod: f64,
+    /// As [`Metrics::color_error`], over all frames.
+    pub color_error: f64,
+}
+
 /// Milliseconds on the device.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Cost {
@@ -152,6 +202,21 @@ impl Errors {
         let Metrics { rmse, rel_l2, color_error, psnr, flip, .. } = *metrics;
         let less_noise = (rel_l2 * rel_l2 - noise * noise - truth * truth).max(0.0).sqrt();
         Self { rmse, rel_l2, color_error, psnr, flip, energy, directions, noise, less_noise }
+    }
+}
+
+impl ZoomRow {
+    /// With the flicker of a sequence, of its noise and of its truths'.
+    pub(super) fn of(self, [flicker, noise, truth]: [f64; 3], jod: f64, color_error: f64) -> Self {
+        let less_noise = (flicker * flicker - noise * noise - truth * truth).max(0.0).sqrt();
+        Self { found: Some(Moving { flicker, noise, less_noise, jod, color_error }), ..self }
+    }
+}
+
+impl Zoom {
+    /// What was found of the filter of that name.
+    pub fn found(&self, filter: &str) -> Option<Moving> {
+        self.rows.iter().find(|row| row.filter == filter)?.found
     }
 }
 
