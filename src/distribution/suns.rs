@@ -253,7 +253,7 @@ mod tests {
     /// A sun of more texels than there may be points: what they add up to is the same.
     #[test]
     fn points_add_up_to_the_sun() {
-        let map = map([2048, 1024], &[([700, 420], 11)]);
+        let map = map([3072, 1536], &[([700, 760], 9)]);
         let sun = &Suns::of(&map).suns[0];
         assert!(sun.points.len() <= MAX_POINTS && sun.points.len() >= MAX_POINTS / 4, "{}", sun.points.len());
         let [mean, sum] = together(sun.points.iter());
