@@ -181,6 +181,22 @@ fn a_small_sun_in_a_mirror_is_not_noisy() {
     assert!(mean.deviation() < 2.5e-3, "{}", mean.deviation());
 }
 
+/// Lobes about as narrow as the sun show its shape, which is that of its texels as they are looked up: as one point it is off by
+/// several percent.
+#[test]
+fn a_sun_in_a_mirror_has_its_shape() {
+    let mirror = ggx(0.015, DVec3::new(0.9, 0.8, 0.6), DVec3::ZERO);
+    let world = world("sphere", 64, mirror, builtin::environment("sun-sky", 1024).unwrap());
+    let frame = |estimator, directions| Stage::new(&world, &config(EXTENT, estimator, directions)).frame([3, 0]);
+    let (plain, beside) = (frame(Estimator::Mis, 8192), frame(Estimator::Cv, 64));
+    let covered = || (0..plain.texels.len()).filter(|i| plain.coverage(*i) > 0.0);
+    let difference: f64 = covered().map(|i| plain.radiance(i).distance_squared(beside.radiance(i))).sum();
+    let all: f64 = covered().map(|i| plain.radiance(i).length_squared()).sum();
+    let error = (difference / all).sqrt();
+    println!("relative to all light: {error:.5}");
+    assert!(error < 5e-3, "{error}");
+}
+
 #[test]
 fn frames_depend_on_their_seeds_and_on_nothing_else() {
     let world = world("bumpy-sphere", 48, table("metallic-paint"), sky("sun-sky"));

@@ -3,7 +3,7 @@
 
 use crate::sampling::latlong::direction;
 use crate::sampling::{LatLong, luminance};
-use glam::{DVec2, DVec3};
+use glam::{DVec2, DVec3, IVec2};
 use std::collections::BTreeMap;
 use std::f64::consts::{PI, TAU};
 
@@ -27,8 +27,8 @@ pub struct Sun {
     pub direction: DVec3,
     /// Irradiance at normal incidence.
     pub irradiance: DVec3,
-    /// Its parts, for reflectances in which its shape is seen: direction and irradiance of each texel, or of each square of them
-    /// where there are more than [`MAX_POINTS`].
+    /// Points that stand for it in reflectances in which its shape is seen, direction and irradiance of each: four a texel, or a
+    /// square of them where that would be more than [`MAX_POINTS`], with the means and variances of what they stand for.
     pub points: Vec<[DVec3; 2]>,
     /// The largest angle in radians between `direction` and a point's.
     pub radius: f64,
@@ -63,27 +63,39 @@ fn place(map: &LatLong, i: usize) -> [i32; 2] {
     [(i % width) as i32, (i / width) as i32]
 }
 
-fn towards(map: &LatLong, [x, y]: [i32; 2]) -> DVec3 {
-    let size = DVec2::new(map.width().into(), map.height().into());
-    direction(DVec2::new(f64::from(x) + 0.5, f64::from(y) + 0.5) / size)
+/// Column and row of a texel's centre are whole numbers here.
+fn towards(map: &LatLong, place: DVec2) -> DVec3 {
+    direction((place + 0.5) / DVec2::new(map.width().into(), map.height().into()))
 }
 
-/// Direction and irradiance of several parts: the mean by luminance, and the sum.
-fn together<'a>(parts: impl Iterator<Item = &'a [DVec3; 2]>) -> [DVec3; 2] {
-    let add = |[mean, sum]: [DVec3; 2], &[at, taken]: &[DVec3; 2]| [mean + at * luminance(taken), sum + taken];
-    let [mean, sum] = parts.fold([DVec3::ZERO; 2], add);
-    [mean.normalize(), sum]
+/// A texel of a sun: column and row, which may lie beyond a seam, and what it adds to irradiance.
+type Part = ([i32; 2], DVec3);
+
+/// Of several parts, the mean by luminance of columns and rows, their variances, and the sum.
+fn together(parts: &[Part]) -> (DVec2, DVec2, DVec3) {
+    let at = |[x, y]: [i32; 2]| DVec2::new(x.into(), y.into());
+    let sum: DVec3 = parts.iter().map(|(_, taken)| *taken).sum();
+    let mean = parts.iter().map(|(place, taken)| at(*place) * luminance(*taken)).sum::<DVec2>() / luminance(sum);
+    let squares: DVec2 = parts.iter().map(|(place, taken)| (at(*place) - mean).powf(2.0) * luminance(*taken)).sum();
+    (mean, squares / luminance(sum), sum)
 }
 
-/// At most [`MAX_POINTS`] parts: what lies in each square of as few texels as that takes.
-fn squares(parts: &[([i32; 2], [DVec3; 2])]) -> Vec<[DVec3; 2]> {
+/// At most [`MAX_POINTS`] points, column and row and share of irradiance: four for what lies in each square of as few texels as that
+/// takes, which have its mean and variances. A texel's are those of the tent by which maps are looked up.
+fn points(parts: &[Part]) -> Vec<(DVec2, DVec3)> {
+    const TENT: f64 = 1.0 / 6.0;
     let by = |side: i32| {
-        let mut squares: BTreeMap<[i32; 2], Vec<&[DVec3; 2]>> = BTreeMap::new();
-        parts.iter().for_each(|(place, part)| squares.entry(place.map(|e| e / side)).or_default().push(part));
+        let mut squares: BTreeMap<[i32; 2], Vec<Part>> = BTreeMap::new();
+        parts.iter().for_each(|part| squares.entry(part.0.map(|e| e.div_euclid(side))).or_default().push(*part));
         squares
     };
-    let few = (1..).map(by).find(|squares| squares.len() <= MAX_POINTS).unwrap_or_default();
-    few.into_values().map(|square| together(square.into_iter())).collect()
+    let few = (1..).map(by).find(|squares| 4 * squares.len() <= MAX_POINTS).unwrap_or_default();
+    let four = |square: Vec<Part>| {
+        let (mean, variances, sum) = together(&square);
+        let [x, y] = (variances + TENT).powf(0.5).to_array();
+        [[-x, -y], [x, -y], [-x, y], [x, y]].map(|offset| (mean + DVec2::from(offset), sum / 4.0))
+    };
+    few.into_values().flat_map(four).collect()
 }
 
 impl Suns {
@@ -105,7 +117,7 @@ impl Suns {
         let mut candidates: Vec<usize> = (0..texels.len()).filter(|&i| largest(texels[i]) > bright).collect();
         candidates.sort_by(|&a, &b| largest(texels[b]).total_cmp(&largest(texels[a])).then(a.cmp(&b)));
         let radius = RADIUS.max(2.5 * PI / f64::from(map.height()));
-        let directions: Vec<DVec3> = candidates.iter().map(|&i| towards(map, place(map, i))).collect();
+        let directions: Vec<DVec3> = candidates.iter().map(|&i| towards(map, IVec2::from(place(map, i)).as_dvec2())).collect();
         let (mut taken, mut groups) = (vec![false; candidates.len()], 0);
         for seed in 0..candidates.len() {
             if taken[seed] {
@@ -147,12 +159,12 @@ impl Suns {
             let at = [place[0].rem_euclid(map.width() as i32), place[1]];
             let texel = map.texel(at[0].into(), at[1].into());
             if self.sun_of(map, at) == Some(number) {
-                let taken = (texel - texel * self.factor(texel)) * solid_angle(map, at[1] as u32);
-                parts.push(([place[0] - x0, place[1] - y0], [towards(map, at), taken]));
+                parts.push((place, (texel - texel * self.factor(texel)) * solid_angle(map, at[1] as u32)));
             }
         }
-        let [direction, irradiance] = together(parts.iter().map(|(_, part)| part));
-        let points = squares(&parts);
+        let irradiance = parts.iter().map(|(_, taken)| *taken).sum();
+        let points: Vec<_> = points(&parts).into_iter().map(|(place, taken)| [towards(map, place), taken]).collect();
+        let direction = points.iter().map(|[at, taken]| at * luminance(*taken)).sum::<DVec3>().normalize();
         let radius = points.iter().map(|[at, _]| at.angle_between(direction)).fold(0.0, f64::max);
         self.suns[number] = Sun { direction, irradiance, points, radius, texels: bounds };
     }
@@ -245,9 +257,9 @@ mod tests {
         let sun = &Suns::of(&map).suns[0];
         let expected = direction(DVec2::new(0.5 / 512.0, 101.5 / 256.0));
         assert!(sun.direction.distance(expected) < 1e-3, "{sun:?}");
-        assert_eq!(sun.points.len(), 9);
+        assert_eq!(sun.points.len(), 36);
         let texel = PI / 256.0;
-        assert!(sun.radius > texel && sun.radius < 1.5 * texel, "{}", sun.radius);
+        assert!(sun.radius > 1.5 * texel && sun.radius < 2.1 * texel, "{}", sun.radius);
     }
 
     /// A sun of more texels than there may be points: what they add up to is the same.
@@ -256,9 +268,12 @@ mod tests {
         let map = map([3072, 1536], &[([700, 760], 9)]);
         let sun = &Suns::of(&map).suns[0];
         assert!(sun.points.len() <= MAX_POINTS && sun.points.len() >= MAX_POINTS / 4, "{}", sun.points.len());
-        let [mean, sum] = together(sun.points.iter());
+        let sum: DVec3 = sun.points.iter().map(|[_, taken]| *taken).sum();
         assert!((sum / sun.irradiance - 1.0).abs().max_element() < 1e-12, "{sum} {}", sun.irradiance);
-        assert!(mean.distance(sun.direction) < 1e-5, "{mean} {}", sun.direction);
+        // Of 9 texels in a row and of the tent of each.
+        let height = |[at, _]: &[DVec3; 2]| (at.y.acos() - sun.direction.y.acos()) * 1536.0 / PI;
+        let variance = sun.points.iter().map(|p| height(p).powi(2) * luminance(p[1])).sum::<f64>() / luminance(sum);
+        assert!((variance / (80.0 / 12.0 + 1.0 / 6.0) - 1.0).abs() < 0.01, "{variance}");
     }
 
     #[test]
