@@ -2,10 +2,11 @@
 // after lights.glsl and approximation.glsl; the includer reads suns and declares `lights`.
 #ifndef DIRECT_GLSL
 #define DIRECT_GLSL
+
 // Concentration of a lobe, times a sun's squared radius, above which the sun is no point to it: its peak would be higher by a
 // quarter of that.
 const float SHARP = 0.04;
-// Of the radius and the lobe's standard deviation, beyond which the sun is a point again.
+// So many radii and standard deviations of the lobe away the sun is a point again.
 const float FAR = 4.0;
 
 // What light from unit world direction w adds, of irradiance `power` at normal incidence.
