@@ -66,7 +66,8 @@ layout(set = 2, binding = 9) uniform usampler2D factors;
 layout(set = 2, binding = 12) uniform sampler2D base; // radiance by those lobes, suns and exact lights
 #include "direct.glsl"
 
-// Estimates whose squares are this many variances are as good as none: what measured best of 0.5, 1 and 2 with 16 and 64 directions.
+// Estimates whose squares are this many variances are as good as none beside lobes that miss nothing: what measured best of 0.5, 1 and 2
+// with 16 and 64 directions.
 const float NOISE = 2.0;
 
 layout(push_constant) uniform Push {
@@ -259,13 +260,14 @@ void tally_kind(inout Tally t, uint n) {
 }
 
 // What the lobes lack, and as much of it as is no noise. The estimate is a regression: of what is looked up, whose true sum is `known`,
-// as much is taken out as makes the noise least. Where that is still as large as the estimate, the lobes alone are nearer.
-vec3 lacking(Tally t, vec3 known) {
+// as much is taken out as makes the noise least. Where that is still as large as the estimate, the lobes alone are nearer, unless they are
+// known to miss a share `error` of light.
+vec3 lacking(Tally t, vec3 known, float error) {
     float both = t.variances.y, looked_up = t.variances.z;
     float share = looked_up > 0.0 ? clamp(both / looked_up, 0.0, 1.0) : 1.0;
     vec3 found = t.sum.whole - share * t.sum.looked_up - (1.0 - share) * known;
     float variance = max(t.variances.x + share * (share * looked_up - 2.0 * both), 0.0), size = luminance(found);
-    return found * max(1.0 - NOISE * variance / max(size * size, 1e-30), 0.0);
+    return found * max(1.0 - NOISE * (1.0 - error) * variance / max(size * size, 1e-30), 0.0);
 }
 
 // Stores the radiance at sample p, which stands for a cell of level l.
@@ -366,7 +368,7 @@ void main() {
         if (LOCAL_LIGHTS) {
             direct += reflected_lights(f, m, s.lobes, at);
         }
-        sum = lacking(t, max(known - direct, 0.0)) + t.sum.lights;
+        sum = lacking(t, max(known - direct, 0.0), min(approximation_error(a), 1.0)) + t.sum.lights;
         known += push.offset;
         sum = max(sum + known, 0.0) / known;
     }

@@ -62,6 +62,14 @@ impl Light {
         matches!(self, Self::Sphere { .. } | Self::Rectangle { .. })
     }
 
+    /// Of what is sampled, the radiance in its largest channel; 0 of all else.
+    pub(crate) fn sampled_radiance(&self) -> f32 {
+        match *self {
+            Self::Sphere { radiance: [r, g, b], .. } | Self::Rectangle { radiance: [r, g, b], .. } => r.max(g).max(b),
+            Self::Point { .. } | Self::Directional { .. } => 0.0,
+        }
+    }
+
     fn record(&self) -> LightRecord {
         let with = |[x, y, z]: [f32; 3], w: f32| [x, y, z, w];
         let none = LightRecord::default();

@@ -29,10 +29,6 @@ use crate::targets::Targets;
 use ash::vk;
 use glam::Mat3;
 
-/// Of the mean luminance of the environment: what is added on both sides of a factor on light that is looked up, so that factors stay
-/// small where there is little of it.
-const FACTOR_OFFSET: f64 = 0.02;
-
 /// Says so when a renderer is dropped instead of destroyed: its handles leak, since submitted work may still use them.
 struct Undestroyed;
 
@@ -225,7 +221,8 @@ impl Renderer {
                 Some(level.view)
             }
             (Some(level), _) if let (Some(pass), Some(fits)) = (&passes.residual_level, &materials.fits) => {
-                pass.record(rec, &residual_level::Io { frame, bridge, samplers, normals, materials, fits, level });
+                let area_lights = area > 0;
+                pass.record(rec, &residual_level::Io { frame, bridge, samplers, normals, materials, fits, area_lights, level });
                 rec.image(level, Access::COMPUTE_SAMPLED);
                 Some(level.view)
             }
@@ -303,7 +300,7 @@ impl Renderer {
         }
 
         // 8  Radiance of the samples to shade, or what the base leaves of it.
-        let offset = (FACTOR_OFFSET * environment.mean * f64::from(inputs.environment.intensity)).max(1e-6) as f32;
+        let offset = shade::offset(environment.mean * f64::from(inputs.environment.intensity), inputs.lights);
         if let Some(pass) = &of_kinds.shade {
             let known = targets.base.as_ref().zip(materials.fits.as_ref()).zip(environment.prefiltered.as_ref());
             let residual = known.map(|((base, fits), light)| shade::Residual { base, fits, suns: &light.suns, offset });

@@ -154,6 +154,29 @@ fn levels_follow_from_errors() {
     }
 }
 
+/// Of area lights the base knows nothing: they are in the residual alone, and are not up-sampled by a factor on what may be dark.
+#[test]
+fn area_lights_alone_are_shaded_everywhere() {
+    let mut world = scene();
+    world.environment = None;
+    world.lights.push(Light::Sphere { position: [1.5, 2.5, 2.0], radius: 0.4, radiance: [30.0; 3] });
+    world.lights.push(Light::Point { position: [-2.0, 2.0, 2.0], intensity: [20.0; 3] });
+    for samples_per_side in [1, 2] {
+        let config = |estimator, directions| Config { estimator, directions, samples_per_side, ..residual(Rate::Bandwidth) };
+        let found = layers(&world, config(Estimator::Residual, 64), &[Aov::Decision]);
+        let plain = Config { rate: Rate::Full, ..config(Estimator::Mis, 1024) };
+        let truth = layers(&world, plain, &[]);
+        let [mut difference, mut all] = [0.0; 2];
+        for (a, b) in layer(&found, "G").iter().zip(layer(&truth, "G")) {
+            difference += f64::from(a - b).powi(2);
+            all += f64::from(*b).powi(2);
+        }
+        let error = (difference / all).sqrt();
+        println!("{samples_per_side} samples a side: {error:.5}");
+        assert!(error < 0.03, "{samples_per_side}: {error}");
+    }
+}
+
 #[test]
 fn area_lights_are_not_left_out() {
     let mut world = scene();

@@ -45,6 +45,8 @@ pub(crate) struct Io<'a> {
     pub normals: &'a Image,
     pub materials: &'a MaterialImages,
     pub fits: &'a Buffer,
+    /// Whether residuals hold area lights, of which fits know nothing: then each sample is shaded for itself.
+    pub area_lights: bool,
     /// Out: the level of each sample, in levels over a sample.
     pub level: &'a Image,
 }
@@ -72,7 +74,8 @@ impl ResidualLevel {
             Resource::Buffer(io.fits),
             Resource::Storage(io.level.view),
         ];
-        self.0.bind(rec, io.bridge, &resources, &self.1);
+        let errors = if io.area_lights { [-1.0; 2] } else { self.1.errors };
+        self.0.bind(rec, io.bridge, &resources, &Push { errors, ..self.1 });
         self.0.dispatch(rec, io.level.extent());
         rec.end();
     }

@@ -12,6 +12,7 @@ use crate::gpu::recorder::Recorder;
 use crate::gpu::retire::Retired;
 use crate::gpu::sampler::Samplers;
 use crate::kinds::Kinds;
+use crate::light::Light;
 use crate::pass::PassContext;
 use crate::pass::environment::EnvironmentImages;
 use crate::pass::materials::MaterialImages;
@@ -112,6 +113,13 @@ pub(crate) fn lobe_constants(config: &Config, kinds: Kinds) -> [u32; 8] {
     let of_filter = [layers > 0, slopes, smith].map(u32::from);
     let ([lobed, slopes, smith], [unfiltered, fitted, reflected]) = (of_filter, of_kinds);
     [layers.max(1), lobed, slopes, smith, unfiltered, u32::from(elliptic), fitted, reflected]
+}
+
+/// What is added on both sides of a factor on light that is looked up, so that factors stay small where there is little of it beside
+/// what is not: of the environment, of mean luminance `mean`, a little, as the base has most of it; of area lights all.
+pub(crate) fn offset(mean: f64, lights: &[Light]) -> f32 {
+    const LITTLE: f64 = 0.02;
+    lights.iter().map(Light::sampled_radiance).sum::<f32>() + (LITTLE * mean).max(1e-6) as f32
 }
 
 impl Shade {
