@@ -8,11 +8,15 @@
 layout(local_size_x = 8, local_size_y = 8) in;
 // FILTER_* of moments.glsl.
 layout(constant_id = 0) const uint FILTER = 0u;
-// Whether lobes and normals make one by equations 13 and 14, which are for small angles, and its length is by equation 9.
-layout(constant_id = 1) const bool LITERAL = false;
+// How lobes and normals make one: by mean vectors (0), or by equations 13 and 14, which are for small angles, with its length by
+// equation 9 (1) or by the table (2).
+layout(constant_id = 1) const uint RULE = 0u;
 layout(set = 2, binding = 0) uniform sampler2DArray normals;   // x and y
 layout(set = 2, binding = 1) uniform sampler2DArray roughness; // a value
 layout(set = 2, binding = 2, rgba32f) uniform writeonly image2DArray moments;
+layout(set = 2, binding = 3, std430) readonly buffer Spreads {
+    float spreads[]; // src/distribution/literal.rs, SpreadTable
+};
 layout(push_constant) uniform Push {
     vec4 base[MOST_BASE_LOBES]; // lobes about the normal: mean direction; spread without a map of roughness
     vec4 weights;
@@ -71,6 +75,16 @@ void encode(vec3 mu, float spread, out vec4 first, out vec4 second) {
     }
 }
 
+const float LOG_MOST_TABULATED = 11.090370; // log(1 + 65536)
+
+// The spread of a lobe, from the table: even in the logarithm of 1 + kappa, linear between entries.
+float tabulated_spread(float kappa) {
+    int last = spreads.length() - 1;
+    float at = clamp(log(1.0 + kappa) / LOG_MOST_TABULATED, 0.0, 1.0) * float(last);
+    int first = min(int(at), last - 1);
+    return mix(spreads[first], spreads[first + 1], at - float(first));
+}
+
 void main() {
     ivec2 p = ivec2(gl_GlobalInvocationID.xy), size = imageSize(moments).xy;
     if (any(greaterThanEqual(p, size))) {
@@ -104,9 +118,14 @@ void main() {
         }
         float own = roughness_layer < 0 ? base[i].w : of_map;
         float spread = lost + kept * own;
-        if (LITERAL) {
+        if (RULE != 0u) {
             float kappa = vmf_concentration(own), exponent = max(kappa - 1.0, 0.0), of_normals = vmf_literal_concentration(off);
-            spread = vmf_literal_spread(1.0 + (off < VMF_LEAST_SPREAD ? exponent : of_normals * exponent / (of_normals + exponent)));
+            float both = 1.0 + (off < VMF_LEAST_SPREAD ? exponent : of_normals * exponent / (of_normals + exponent));
+            if (RULE == 2u) {
+                spread = tabulated_spread(both);
+            } else {
+                spread = vmf_literal_spread(both);
+            }
         }
         vec4 a, b;
         encode(turned, spread, a, b);

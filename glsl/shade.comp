@@ -47,6 +47,8 @@ layout(constant_id = 10) const uint UNFILTERED = 1u;
 layout(constant_id = 15) const uint RATIO = 0u;
 // Whether directions are drawn from the reflectance alone.
 layout(constant_id = 17) const uint ALONE = 0u;
+// Share of the directions that are not the reflectance's.
+layout(constant_id = 18) const float OTHER_SHARE = 0.5;
 
 layout(set = 2, binding = 3, std430) readonly buffer Arguments {
     uint groups_x, groups_y, groups_z;
@@ -93,8 +95,8 @@ uint turn(ivec2 p, int l, int finer) {
     return uint((inside.x & 1) | (inside.y & 1) << 1 | (inside.x & 2) << 1 | (inside.y & 2) << 2);
 }
 
-// Directions::split of src/plan.rs: half from the reflectance; the other half in equal parts from the environment and each area
-// light, as far as there are any.
+// Directions::split of src/plan.rs: a share from the reflectance; the others in equal parts from the environment and each area light,
+// as far as there are any.
 void split(uint n) {
     uint area = LOCAL_LIGHTS ? frame.lights.y : 0u;
     uint sources = area + (push.environment_samples > 0u ? 1u : 0u);
@@ -104,7 +106,7 @@ void split(uint n) {
         light_samples = 0u;
         return;
     }
-    uint other = n / 2u;
+    uint other = min(uint(float(n) * OTHER_SHARE), n - 1u);
     light_samples = area > 0u ? max(other / sources, 1u) : 0u;
     brdf_samples = n - other;
     environment_samples = push.environment_samples > 0u ? uint(max(int(other) - int(light_samples * area), 1)) : 0u;

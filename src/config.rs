@@ -1,5 +1,6 @@
 //! What a renderer is built for. Everything here is fixed until [`crate::Renderer::resize`] or a new renderer.
 
+use crate::distribution::effective::Rule;
 use crate::distribution::fit::MOST_LOBES;
 use crate::distribution::fitter::Budget;
 use crate::distribution::{Division, Filter};
@@ -168,15 +169,17 @@ pub struct Config {
     pub lod_bias: f32,
     /// What divides a cell for [`Filter::Vmf`].
     pub division: Division,
-    /// Whether the filters of Xu et al. 2017 have the paper's own relation of length and concentration (equations 8 and 9) and rule
-    /// for normals and lobes (13 and 14).
-    pub literal_lobes: bool,
+    /// How the filters of Xu et al. 2017 make one lobe of a base lobe and the normals under it; others have their own.
+    pub lobe_rule: Rule,
     /// Whether the mesh's curvature widens lobes as [`Filter::Tk`] does, whatever the filter.
     pub geometric: bool,
     /// Directions a shaded sample, 1 to 65536; at least 2 where [`Estimator`] combines two kinds. Where [`Rate::Bandwidth`] chooses among several
     /// samples a pixel, whatever stands for a pixel or more gets [`Config::samples_per_side`] times as many, and each finer level a
     /// quarter of the level above.
     pub directions: u32,
+    /// Share of a sample's directions that are drawn from the reflectance, or from what its lobes leave of it, above 0 and below 1: where
+    /// [`Estimator`] combines two kinds.
+    pub reflectance_share: f32,
     /// The most lobes that a material is fitted by where light is looked up, 1 to 24.
     pub fit_lobes: u32,
     /// The mean error of a fit at which fewer lobes are enough, 0 to 1.
@@ -221,9 +224,10 @@ impl Config {
             anisotropy: 1,
             lod_bias: 0.0,
             division: Division::default(),
-            literal_lobes: false,
+            lobe_rule: Rule::default(),
             geometric: false,
             directions: 64,
+            reflectance_share: 0.5,
             fit_lobes: MOST_LOBES as u32,
             fit_error: Budget::default().error,
             residual_errors: RESIDUAL_ERRORS,
@@ -256,9 +260,9 @@ impl Config {
         self.geometric || self.filter == Filter::Tk
     }
 
-    /// Whether normals and lobes make one as the paper of the filter has it.
-    pub(crate) fn takes_lobes_literally(&self) -> bool {
-        self.literal_lobes && self.filter.is_vmf()
+    /// How normals and lobes make one with the filter that there is.
+    pub(crate) fn effective_rule(&self) -> Rule {
+        if self.filter.is_vmf() { self.lobe_rule } else { Rule::Exact }
     }
 
     /// Samples a side of the blocks that the prediction works on: 2x2 pixels.
@@ -324,6 +328,8 @@ impl Config {
             &format!("Full, as the estimator is {:?}", self.estimator),
             format!("{:?}", self.rate),
         )?;
+        let share = self.reflectance_share;
+        check(share > 0.0 && share < 1.0, "reflectance_share", "above 0 and below 1", share.to_string())?;
         let most = MOST_LOBES as u32;
         check((1..=most).contains(&self.fit_lobes), "fit_lobes", &format!("1 to {most}"), self.fit_lobes.to_string())?;
         check((0.0..=1.0).contains(&self.fit_error), "fit_error", "0 to 1", self.fit_error.to_string())?;

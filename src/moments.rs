@@ -171,20 +171,19 @@ pub struct Moments {
 
 impl Moments {
     /// Those that `filter` reads of a valid material; `None` for filters that read no mips of normals, and for materials without
-    /// a map to filter. `literal` is [`crate::Config::literal_lobes`].
-    pub fn of(material: &Material, filter: Filter, division: Division, literal: bool) -> Option<Self> {
+    /// a map to filter. `rule` is [`crate::Config::lobe_rule`].
+    pub fn of(material: &Material, filter: Filter, division: Division, rule: Rule) -> Option<Self> {
         if !filter.stores() {
             return None;
         }
-        let literal = literal && filter.is_vmf();
-        let rule = if literal { Rule::Literal } else { Rule::Exact };
+        let rule = if filter.is_vmf() { rule } else { Rule::Exact };
         let base = Base::of(material, rule)?;
         let size = base.size(material);
         let keep = |material: &Material, filter, rule| {
             let gaussians = || gaussians(material, &base, size, filter).map_or(Known::Nothing, Known::Gaussians);
             let known = clusters(material, &base, filter).map_or_else(gaussians, Known::Clusters);
             let area = Parameter::of(&material.model).area();
-            Some(Filtered::keeping(filter, BrdfMap::of(material, size, rule).ok()?, literal, known, area)?.divided(division))
+            Some(Filtered::keeping(filter, BrdfMap::of(material, size, rule).ok()?, rule, known, area)?.divided(division))
         };
         let lobes = if base == Base::Normals { None } else { Some(keep(material, filter, rule)?) };
         let normals = if base.upright() {
@@ -267,7 +266,7 @@ mod tests {
     }
 
     fn found(material: &Material, filter: Filter, footprint: [DVec2; 2]) -> FoundLobes {
-        let moments = Moments::of(material, filter, Division::default(), false).unwrap();
+        let moments = Moments::of(material, filter, Division::default(), Rule::Exact).unwrap();
         moments.at(DVec2::new(0.25, 0.5), &Reach::of(footprint, moments.size(), Sampling::default()))
     }
 
@@ -306,8 +305,8 @@ mod tests {
             assert!((far.normal.x - mean.x).abs() < 1e-3 && far.lobes.count() == 0, "{far:?}");
             let rough = Texture::scalar([1, 1], &[0.5]).unwrap();
             let rough = Maps { roughness: Some((Arc::new(rough), Roughness::Alpha)), ..Maps::default() };
-            assert!(Moments::of(&Material::new(model, rough), Filter::Vmf1, Division::default(), false).is_none());
-            assert!(Moments::of(&material, Filter::Tk, Division::default(), false).is_none());
+            assert!(Moments::of(&Material::new(model, rough), Filter::Vmf1, Division::default(), Rule::Exact).is_none());
+            assert!(Moments::of(&material, Filter::Tk, Division::default(), Rule::Exact).is_none());
         }
     }
 

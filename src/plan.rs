@@ -224,16 +224,17 @@ impl Directions {
         Self::split(config, n, environment, area_lights)
     }
 
-    /// Half of `n` from the reflectance; the other half in equal parts from the environment, if it shines, and each of
+    /// [`Config::reflectance_share`] of `n` from the reflectance; the others in equal parts from the environment, if it shines, and each of
     /// `area_lights`, at least one each. Twin of `split` in `glsl/shade.comp`.
     pub fn split(config: &Config, n: u32, environment: bool, area_lights: u32) -> Self {
         let sources = u32::from(environment) + area_lights;
         if !config.estimator.combines() || sources == 0 {
             return Self { brdf: n, environment: 0, light: 0 };
         }
-        let light = if area_lights > 0 { (n / 2 / sources).max(1) } else { 0 };
-        let rest = (n / 2).saturating_sub(light * area_lights).max(1);
-        Self { brdf: n.div_ceil(2), environment: if environment { rest } else { 0 }, light }
+        let other = ((n as f32 * (1.0 - config.reflectance_share)) as u32).min(n.saturating_sub(1));
+        let light = if area_lights > 0 { (other / sources).max(1) } else { 0 };
+        let rest = other.saturating_sub(light * area_lights).max(1);
+        Self { brdf: n - other, environment: if environment { rest } else { 0 }, light }
     }
 
     /// Of a sample that stands for a cell of `level`, in levels over a sample (twin of `share` in `glsl/shade.comp`).

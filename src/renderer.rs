@@ -48,6 +48,8 @@ pub struct Renderer {
     pub(crate) set_up: GpuTimer,
     timings: Option<FrameTimings>,
     pass_bytes: Vec<(&'static str, u64)>,
+    /// Of [`Self::record_materials`].
+    pub(crate) set_up_bytes: Vec<(&'static str, u64)>,
     pub(crate) samplers: Samplers,
     pub(crate) bridge: MaterialBridge,
     pub(crate) uniforms: Vec<Buffer>,
@@ -103,6 +105,7 @@ impl Renderer {
             set_up,
             timings: None,
             pass_bytes: Vec::new(),
+            set_up_bytes: Vec::new(),
             samplers,
             bridge,
             uniforms,

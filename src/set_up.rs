@@ -1,7 +1,6 @@
 //! What is recorded when something changes: the environment, the materials.
 
 use crate::config::Bins;
-use crate::distribution::effective::Rule;
 use crate::error::{Error, Result};
 use crate::gpu::memory::HostAllocator;
 use crate::gpu::pipeline::BridgeLayouts;
@@ -68,7 +67,7 @@ impl Renderer {
     ) -> Result<Retired> {
         let bridge = BridgeLayouts { gbuffer: layout(&self.passes.gbuffer, &self.config), materials: self.bridge.layout };
         let config = &self.config;
-        let rule = if config.takes_lobes_literally() { Rule::Literal } else { Rule::Exact };
+        let rule = config.effective_rule();
         let (modules, slots, widened) = (&config.modules, config.frames_in_flight, config.widened());
         let (filter, bins) = (self.config.filter, self.config.bins);
         let (passes, samplers) = (self.passes.moments.as_ref(), &self.samplers);
@@ -106,6 +105,7 @@ impl Renderer {
             of_map.retire(&mut bag);
             of_mips.retire(&mut bag);
         }
+        self.set_up_bytes = rec.pass_bytes;
         if let Some(former) = self.cells.take() {
             // They are made from the former materials' lobes.
             former.retire(&mut self.states, &mut bag);

@@ -9,6 +9,8 @@ mod support {
 use chosen_device::DEVICE;
 use serde_json::Value;
 use sha2::{Digest, Sha256};
+use std::process::Stdio;
+use std::time::Duration;
 use support::bench::{Folder, number};
 
 /// 64x64 pixels by the scene's own size.
@@ -53,6 +55,7 @@ fn rates_are_compared_with_full_rate_beside_their_error() {
         (&1.into(), &"bagher".into(), &"quick".into(), &3.into())
     );
     assert!(report["device"]["name"].as_str().unwrap().contains(DEVICE));
+    assert_eq!(report["complete"], true);
     let scene = &report["scenes"][0];
     assert_eq!((&scene["name"], &scene["half"], &scene["extent"]), (&"small".into(), &Value::Null, &serde_json::json!([64, 64])));
     let reference = &scene["reference"];
@@ -258,6 +261,25 @@ fn passes_are_timed_one_by_one() {
         assert!(passes(&rows[1]).contains(&"upsample".to_string()) && scene["reference"].is_null());
     }
     assert!(text.contains("the first variant once more takes"), "{text}");
+}
+
+#[test]
+fn an_interrupted_run_leaves_the_scenes_that_were_done() {
+    let folder = Folder::new("interrupted");
+    std::fs::write(folder.0.join("small.toml"), SCENE).unwrap();
+    std::fs::write(folder.0.join("endless.toml"), SCENE.replace("size = [64, 64]", "size = [2048, 2048]")).unwrap();
+    let args = ["small.toml", "endless.toml", "--suite", "passes", "--rounds", "10", "--json", "bench.json"];
+    let path = folder.0.join("bench.json");
+    let mut run = folder.command(&args).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
+    while !path.exists() {
+        assert_eq!(run.try_wait().unwrap(), None, "it ended before its first report");
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    run.kill().unwrap();
+    run.wait().unwrap();
+    let report: Value = serde_json::from_slice(&std::fs::read(path).unwrap()).unwrap();
+    let scenes: Vec<_> = report["scenes"].as_array().unwrap().iter().map(|s| s["name"].clone()).collect();
+    assert_eq!((&report["complete"], scenes), (&false.into(), vec![Value::from("small")]));
 }
 
 #[test]

@@ -137,6 +137,18 @@ fn check_row(row: &Value, light: &str, texels: f64) {
     // It draws lobes in any case.
     let random = row["filter"] == "bruteforce";
     let (errors, cost) = (&row["errors"], &row["cost"]);
+    if let Some(mips) = cost["mips"].as_object() {
+        let (rate, bytes) = (number(&mips["gb_per_s"]), number(&mips["bytes"]));
+        if row["filter"] == "vmf1" {
+            // 16 bytes a texel of each level and of the next.
+            let side = |level: u32| f64::from((SIDE >> level) * (SIDE >> level));
+            assert_eq!(bytes, (0..SIDE.ilog2()).map(|level| 16.0 * (side(level) + side(level + 1))).sum::<f64>());
+        }
+        assert!(
+            (rate * 1e6 * number(&mips["ms"]["median"]) / bytes - 1.0).abs() < 1e-9 && number(&mips["of_copy"]) > 0.0,
+            "{mips:?}"
+        );
+    }
     let all = ["rmse", "rel_l2", "color_error", "psnr", "flip", "energy"].map(|name| number(&errors[name]));
     assert!(all.iter().all(|v| *v > 0.0), "{errors}");
     let noise = number(&errors["noise"]);

@@ -11,6 +11,7 @@ mod support {
 
 use chosen_device::DEVICE;
 use glam::DVec3;
+use passband::distribution::effective::Rule;
 use passband::moments::Moments;
 use passband::offline::builtin;
 use passband::offline::headless::{Headless, Options};
@@ -64,7 +65,7 @@ fn passes_store_the_moments_of_the_twin() {
         let name = &material.name;
         let stored = one.moments(number).unwrap();
         assert!(stored == other.moments(number).unwrap(), "{name}: the same in every run");
-        let Some(twin) = Moments::of(&material.surface(), Filter::Clusters, Division::default(), false) else {
+        let Some(twin) = Moments::of(&material.surface(), Filter::Clusters, Division::default(), Rule::Exact) else {
             assert!(stored.is_none() && material.maps.is_empty(), "{name}");
             continue;
         };
@@ -121,7 +122,7 @@ fn peaks_are_stored_as_they_are() {
     let config = Config { filter: Filter::Fournier4, ..config([8, 8], Estimator::Mis, 2) };
     let mut session = session(&scene, &config);
     for (number, material) in scene.materials.iter().enumerate() {
-        let Some(twin) = Moments::of(&material.surface(), Filter::Fournier4, Division::default(), false) else { continue };
+        let Some(twin) = Moments::of(&material.surface(), Filter::Fournier4, Division::default(), Rule::Exact) else { continue };
         let [_, layers] = session.moments(number).unwrap().unwrap();
         let twin = twin.lobes().unwrap();
         assert_eq!(layers.len(), if material.name == "two lobes" { 8 } else { 4 });

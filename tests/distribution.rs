@@ -6,6 +6,7 @@ mod support {
 }
 
 use glam::{DMat3, DVec3};
+use passband::distribution::effective::Rule;
 use passband::distribution::mixture::Masking;
 use passband::distribution::vmf::Lobe;
 use passband::distribution::{BrdfMap, Cells, Filter, Filtered, Mixture};
@@ -81,7 +82,7 @@ fn study(filtered: &Filtered<'_>, probes: &[Probe]) -> (f64, f64) {
 }
 
 fn stored(filter: Filter, map: &BrdfMap, literal: bool) -> Filtered<'_> {
-    Filtered::new(filter, map, literal).unwrap()
+    Filtered::new(filter, map, if literal { Rule::Literal } else { Rule::Exact }).unwrap()
 }
 
 #[test]

@@ -10,11 +10,13 @@ mod support {
 use chosen_device::DEVICE;
 use glam::DVec3;
 use passband::material::{MOST_KERNEL, geometric_kernel};
+use passband::offline::aov::Aov;
 use passband::offline::builtin;
 use passband::offline::headless::{Headless, Options};
 use passband::offline::reference::{Options as Quadrature, Reference};
+use passband::offline::render::{Settings, render};
 use passband::offline::session::Session;
-use passband::offline::world::World;
+use passband::offline::world::{Camera, World};
 use passband::reflectance::{BlinnPhong, Lobe, Model, Vmf};
 use passband::{Config, Estimator, Filter, Light, Maps, Requirements, Roughness, Texture};
 use std::sync::Arc;
@@ -130,4 +132,41 @@ fn sparkle_on_curved_metal_is_less() {
     let (point, tk) = (error(&point), error(&tk));
     println!("squared error of point {point:.4}, of tk {tk:.4}");
     assert!(tk < 0.7 * point, "{tk} for {point}");
+}
+
+/// The levels that `--aov mip` tells of a plane seen straight on are those of its texels under a pixel, for maps that are read through
+/// mips and no other.
+#[test]
+fn maps_are_looked_up_at_the_level_of_their_texels_under_a_pixel() {
+    let height = 2.2;
+    let mut scene = world("plane", 16, ggx(0.3, DVec3::ONE, DVec3::splat(0.5)), builtin::environment("constant", 16).unwrap());
+    scene.camera = Camera { position: DVec3::Y * height, target: DVec3::ZERO, up: DVec3::Z, fov_y: 40.0 };
+    // The plane is 2 m wide, as are its coordinates 1.
+    let a_pixel = 0.5 * 2.0 * height * 20f64.to_radians().tan() / f64::from(EXTENT[1]);
+    let flat = |size: [u32; 2]| Texture::normals(size, &vec![[0.0, 0.0, 1.0]; (size[0] * size[1]) as usize]).unwrap();
+    let grey = |size: [u32; 2]| Texture::colour8(size, &vec![[128; 3]; (size[0] * size[1]) as usize]).unwrap();
+    let mips = |maps: Maps, filter, lod_bias| {
+        let mut scene = scene.clone();
+        scene.materials[0].maps = maps;
+        let device = Options { device: Some(DEVICE.into()), validate: true };
+        let config = Config { filter, lod_bias, ..config(EXTENT, Estimator::Mis, 2) };
+        let settings = Settings { aovs: vec![Aov::Mip], device, ..Settings::new(config) };
+        let image = render(&scene, &settings, &mut |_, _| {}).unwrap().image;
+        let covered = image.channel("mip.Y").unwrap().iter().zip(image.channel("A").unwrap()).filter(|(_, a)| **a == 1.0);
+        let all: Vec<f32> = covered.map(|(mip, _)| *mip).collect();
+        assert!(all.len() > 2000);
+        let [low, high] = [f32::min, f32::max].map(|f| all.iter().copied().reduce(f).unwrap());
+        assert!(high - low < 0.01, "{low} to {high}");
+        f64::from(all[all.len() / 2])
+    };
+    let colours = |size, tiling| Maps { albedo: Some(Arc::new(grey(size))), tiling: [tiling; 2], ..Maps::default() };
+    let near = |found: f64, texels: f64| assert!((found - texels.log2().max(0.0)).abs() < 0.02, "{found} for {texels} texels");
+    near(mips(colours([256, 256], 1.0), Filter::Point, 0.0), 256.0 * a_pixel);
+    // By the axis along which there are more, and the tiling.
+    near(mips(colours([512, 64], 3.0), Filter::Point, 0.0), 512.0 * 3.0 * a_pixel);
+    near(mips(colours([512, 512], 1.0), Filter::Point, 1.0), 2.0 * 512.0 * a_pixel);
+    near(mips(colours([16, 16], 1.0), Filter::Point, 0.0), 1.0);
+    let both = Maps { normal: Some(Arc::new(flat([512, 512]))), ..colours([128, 128], 2.0) };
+    near(mips(both.clone(), Filter::Point, 0.0), 128.0 * 2.0 * a_pixel);
+    near(mips(both, Filter::Vmf8, 0.0), 512.0 * 2.0 * a_pixel);
 }

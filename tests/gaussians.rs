@@ -12,6 +12,7 @@ mod support {
 use chosen_device::DEVICE;
 use glam::{DVec2, DVec3};
 use passband::distribution::alignment::{Fit, Order};
+use passband::distribution::effective::Rule;
 use passband::distribution::vmf::Lobe;
 use passband::distribution::{BrdfMap, Filtered, Gaussians, Mixture};
 use passband::moments::Moments;
@@ -276,7 +277,7 @@ fn the_device_has_mixtures_that_materials_bring() {
     let mut session = Session::new(headless, &scene, &config).unwrap();
     for (number, material) in scene.materials.iter().enumerate() {
         let name = &material.name;
-        let Some(twin) = Moments::of(&material.surface(), filter, Division::default(), false) else {
+        let Some(twin) = Moments::of(&material.surface(), filter, Division::default(), Rule::Exact) else {
             assert!(session.moments(number).unwrap().is_none() && name == "no map");
             continue;
         };

@@ -11,6 +11,7 @@ mod support {
 
 use chosen_device::DEVICE;
 use glam::DVec3;
+use passband::distribution::effective::Rule;
 use passband::moments::Moments;
 use passband::offline::builtin as scenes;
 use passband::offline::headless::{Headless, Options};
@@ -65,7 +66,7 @@ fn apart(found: &[[f64; 6]], expected: &[[f64; 6]]) -> f64 {
 /// Whether one map is fitted as the twin has it: how many of its texels are otherwise, beyond `bound`, and how many there are.
 fn otherwise(session: &mut Session, scene: &World, number: usize, bound: f64) -> [usize; 2] {
     let material = &scene.materials[number];
-    let twin = Moments::of(&material.surface(), Filter::Gmm, Division::default(), false).unwrap();
+    let twin = Moments::of(&material.surface(), Filter::Gmm, Division::default(), Rule::Exact).unwrap();
     let (twin, layers) = (twin.lobes().unwrap(), fitted(session, number));
     let mut offs = Vec::new();
     for level in 0..twin.levels() {

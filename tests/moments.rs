@@ -12,6 +12,7 @@ mod support {
 use chosen_device::DEVICE;
 use glam::{DVec3, Vec3};
 use passband::distribution::Filtered;
+use passband::distribution::effective::Rule;
 use passband::moments::Moments;
 use passband::offline::builtin;
 use passband::offline::headless::{Headless, Options};
@@ -83,7 +84,7 @@ fn passes_store_what_the_twin_does() {
         for (number, material) in scene.materials.iter().enumerate() {
             let case = format!("{} {}", filter.name(), material.name);
             let stored = session.moments(number).unwrap();
-            let Some(twin) = Moments::of(&material.surface(), filter, Division::default(), false) else {
+            let Some(twin) = Moments::of(&material.surface(), filter, Division::default(), Rule::Exact) else {
                 assert!(stored.is_none() && material.maps.is_empty(), "{case}");
                 continue;
             };
@@ -197,10 +198,10 @@ fn frames_are_those_of_the_quadrature() {
 fn agrees(name: &str, world: &World, options: Quadrature) {
     let expected =
         expected_with(world, [64, 64], options, |interior| interior.into_iter().filter(|i| (i % 64 + i / 64) % 2 == 0).collect());
-    let Quadrature { filter, sampling, division, literal_lobes, .. } = options;
+    let Quadrature { filter, sampling, division, lobe_rule, .. } = options;
     let (anisotropy, lod_bias) = (sampling.anisotropy, sampling.lod_bias as f32);
     let base = config(expected.extent, Estimator::Mis, 4096);
-    let config = Config { filter, anisotropy, lod_bias, division, literal_lobes, ..base };
+    let config = Config { filter, anisotropy, lod_bias, division, lobe_rule, ..base };
     let image = Stage::new(world, &config).frame([0, 0]);
     let radiance = |i: usize| image.radiance(i);
     let mean = ratio(&expected.pixels, radiance);
@@ -228,8 +229,9 @@ fn other_ways_to_read_maps_are_those_of_the_quadrature() {
     let sharper = Sampling { anisotropy: 2, lod_bias: -0.7 };
     agrees("sharper", &stretched, Quadrature { filter: Filter::Lean, sampling: sharper, ..plain });
     let even = scene("sphere", lobes(&[(0.0, 60.0)]), maps([3.0, 2.0]));
-    agrees("as printed", &even, Quadrature { division: Division::PRINTED, literal_lobes: true, ..plain });
-    agrees("as printed", &even, Quadrature { filter: Filter::Vmf1, literal_lobes: true, ..plain });
+    agrees("as printed", &even, Quadrature { division: Division::PRINTED, lobe_rule: Rule::Literal, ..plain });
+    agrees("as printed", &even, Quadrature { filter: Filter::Vmf1, lobe_rule: Rule::Literal, ..plain });
+    agrees("by the table", &even, Quadrature { filter: Filter::Vmf8, lobe_rule: Rule::Tabulated, ..plain });
     agrees("by length", &even, Quadrature { division: Division::Lengths([0.99, 0.97]), ..plain });
 }
 

@@ -12,8 +12,26 @@ pub enum Rule {
     /// By mean vectors, which convolution multiplies: exact for these.
     #[default]
     Exact,
-    /// Equations 13 and 14, which are for small angles.
+    /// As printed: equations 13 and 14, which are for small angles, and 8 and 9 between lengths and concentrations.
     Literal,
+    /// The same, with lengths from the paper's table (section 4, [`literal::SpreadTable`]) in the place of the root of equation 9.
+    Tabulated,
+}
+
+impl Rule {
+    /// Its name in reports.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Exact => "exact",
+            Self::Literal => "literal",
+            Self::Tabulated => "tabulated",
+        }
+    }
+
+    /// Whether it is the paper's, whichever way lengths are found.
+    pub fn is_literal(self) -> bool {
+        self != Self::Exact
+    }
 }
 
 /// The lobes of half vectors of a reflectance about its normal, of weights that sum to 1, with `roughness` in the place of the
@@ -30,7 +48,7 @@ pub fn base(model: &Model, roughness: Option<f64>, rule: Rule) -> Option<Vec<Lob
             Some(about_normal(match rule {
                 // The mean cosine of cos^e is (e + 1) / (e + 2).
                 Rule::Exact => vmf::concentration(1.0 / (exponent + 2.0)),
-                Rule::Literal => exponent + 1.0,
+                Rule::Literal | Rule::Tabulated => exponent + 1.0,
             }))
         }
         Model::Vmf(vmf) => {
@@ -59,7 +77,7 @@ pub fn lobes(base: &[Lobe], normal: DVec3, rule: Rule) -> Vec<Lobe> {
             let spread = (1.0 - share) + share * vmf::spread(lobe.kappa);
             Lobe { mu: (frame * kept).try_normalize().unwrap_or(DVec3::Z), kappa: vmf::concentration(spread), ..*lobe }
         }
-        Rule::Literal => {
+        Rule::Literal | Rule::Tabulated => {
             let spread = 1.0 - length;
             let normals = if spread < LEAST_SPREAD { f64::INFINITY } else { literal::concentration(spread) };
             let kappa = literal::effective(normals, (lobe.kappa - 1.0).max(0.0));

@@ -2,6 +2,7 @@
 
 use crate::distribution::brdf_map::BrdfMap;
 use crate::distribution::clusters::{Clusters, Decoded, MOMENTS};
+use crate::distribution::effective::Rule;
 use crate::distribution::filter::{Division, Filter, Storage};
 use crate::distribution::gaussians::Gaussians;
 use crate::distribution::mip::Mips;
@@ -29,7 +30,7 @@ pub struct Filtered<'a> {
     filter: Filter,
     storage: Storage,
     map: Cow<'a, BrdfMap>,
-    literal: bool,
+    rule: Rule,
     division: Division,
     /// The mean concentration of the map.
     constant: f64,
@@ -63,30 +64,30 @@ pub(crate) enum Known {
 }
 
 impl<'a> Filtered<'a> {
-    /// `map` as `filter` stores it. `literal` takes for `vmf*` the paper's own relation of length and concentration (equations
+    /// `map` as `filter` stores it. Unless it is exact, `rule` takes for `vmf*` the paper's own relation of length and concentration (equations
     /// 8 and 9) and its tests of length (Algorithm 1, with the weights of equation 15, without which energy would grow with the
     /// number of cells). `None` for a filter that stores nothing.
-    pub fn new(filter: Filter, map: &'a BrdfMap, literal: bool) -> Option<Self> {
+    pub fn new(filter: Filter, map: &'a BrdfMap, rule: Rule) -> Option<Self> {
         let known = match filter.has_clusters() {
             true => Known::Clusters(Clusters::of(map.size(), map.normal(0).is_some(), &|i| map.texel(i).to_vec())),
             false => Known::Nothing,
         };
-        Self::over(filter, Cow::Borrowed(map), literal, known, |kappa| vmf::mean_cosine(kappa).max(LEAST_PROJECTED_AREA))
+        Self::over(filter, Cow::Borrowed(map), rule, known, |kappa| vmf::mean_cosine(kappa).max(LEAST_PROJECTED_AREA))
     }
 
     /// `map` with mixtures of it. `None` if they are of another size.
     pub fn of_gaussians(map: &'a BrdfMap, known: Gaussians) -> Option<Self> {
         let area: Area = |kappa| vmf::mean_cosine(kappa).max(LEAST_PROJECTED_AREA);
         let all = known.are_of(map).then(|| Known::Gaussians(Arc::new(known)))?;
-        Self::over(Filter::Gmm, Cow::Borrowed(map), false, all, area)
+        Self::over(Filter::Gmm, Cow::Borrowed(map), Rule::Exact, all, area)
     }
 
     /// The same, which keeps the map, with its clusters if the filter has some, or its mixtures if these are known.
-    pub(crate) fn keeping(filter: Filter, map: BrdfMap, literal: bool, known: Known, area: Area) -> Option<Filtered<'static>> {
-        Filtered::over(filter, Cow::Owned(map), literal, known, area)
+    pub(crate) fn keeping(filter: Filter, map: BrdfMap, rule: Rule, known: Known, area: Area) -> Option<Filtered<'static>> {
+        Filtered::over(filter, Cow::Owned(map), rule, known, area)
     }
 
-    fn over(filter: Filter, map: Cow<'a, BrdfMap>, literal: bool, known: Known, area: Area) -> Option<Self> {
+    fn over(filter: Filter, map: Cow<'a, BrdfMap>, rule: Rule, known: Known, area: Area) -> Option<Self> {
         let storage = filter.storage()?;
         let constant =
             map.lobes().iter().map(|l| l.weight * l.kappa).sum::<f64>() * map.lobes_per_texel() as f64 / map.lobes().len() as f64;
@@ -103,10 +104,10 @@ impl<'a> Filtered<'a> {
         let channels = if let Kept::Clusters(clusters) = &kept { clusters.all().len() * MOMENTS } else { slots * stride };
         let mips = Mips::new(map.size(), channels, |i, out| match &kept {
             Kept::Clusters(clusters) => encode_clusters(clusters, map.texel(i), map.normal(i), area, out),
-            _ => encode(storage, map.texel(i), map.normal(i), literal, out),
+            _ => encode(storage, map.texel(i), map.normal(i), rule, out),
         });
-        let division = if literal { Division::PRINTED } else { Division::default() };
-        Some(Self { filter, storage, map, literal, division, constant, area, kept, mips })
+        let division = if rule.is_literal() { Division::PRINTED } else { Division::default() };
+        Some(Self { filter, storage, map, rule, division, constant, area, kept, mips })
     }
 
     /// The same with another rule for the cells of [`Filter::Vmf`].
@@ -146,7 +147,7 @@ impl<'a> Filtered<'a> {
         }
         let (slots, stride) = self.storage.layout(self.map.lobes_per_texel());
         let mut out = vec![0.0; slots * stride];
-        encode(self.storage, lobes, self.map.normal(i), self.literal, &mut out);
+        encode(self.storage, lobes, self.map.normal(i), self.rule, &mut out);
         (!lobes.is_empty()).then_some(out)
     }
 
@@ -276,7 +277,7 @@ impl<'a> Filtered<'a> {
         if self.filter == Filter::Vmf {
             self.divide(&cells, 0, 1.0, &mut lobes);
         } else {
-            lobes.extend(cells.iter().filter_map(|cell| cell.lobe(self.literal, 1.0)));
+            lobes.extend(cells.iter().filter_map(|cell| cell.lobe(self.rule, 1.0)));
         }
         lobes
     }
@@ -320,7 +321,7 @@ impl<'a> Filtered<'a> {
         let whole = cells.iter().fold(Cell([0.0; CELL]), |sum, cell| sum.plus(cell));
         let kept = if depth == DIVISIONS { 1.0 } else { self.kept(&whole, depth) };
         if kept > 0.0 {
-            lobes.extend(whole.lobe(self.literal, share * kept));
+            lobes.extend(whole.lobe(self.rule, share * kept));
         }
         if kept < 1.0 {
             for part in cells.chunks(if depth == 0 { 2 } else { 1 }) {

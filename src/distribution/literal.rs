@@ -1,6 +1,7 @@
 //! The forms that Xu et al. 2017 print, where exact ones stand in their place: the comparison needs both.
 
 use crate::distribution::vmf::LEAST_SPREAD;
+use std::sync::LazyLock;
 
 /// The concentration of a characteristic vector whose length is `1 - spread`, which is clamped to at least [`LEAST_SPREAD`]
 /// and at most 1 (equation 8, after Banerjee et al. 2005, "Clustering on the unit hypersphere using von Mises-Fisher
@@ -24,6 +25,12 @@ pub fn spread(kappa: f64) -> f64 {
 /// Entries of [`SpreadTable`].
 pub const TABLE_ENTRIES: usize = 1024;
 
+/// The sharpest lobe that a [`SpreadTable`] for maps has: that of an alpha of 0.0055.
+pub const MOST_TABULATED: f64 = 65_536.0;
+
+/// The table for maps; sharper lobes count as its sharpest.
+pub static SPREADS: LazyLock<SpreadTable> = LazyLock::new(|| SpreadTable::new(MOST_TABULATED));
+
 /// [`spread`] in a 1 x 1024 table (section 4), linearly filtered. The paper does not say how concentrations are spaced: here
 /// `ln(1 + kappa)` is even, as evenly spaced concentrations would be 95 % off at the sharp end.
 #[derive(Clone, Debug)]
@@ -37,6 +44,11 @@ impl SpreadTable {
     pub fn new(most: f64) -> Self {
         let kappa = |i: usize| (i as f64 / (TABLE_ENTRIES - 1) as f64 * most.ln_1p()).exp_m1();
         Self { most, entries: (0..TABLE_ENTRIES).map(|i| spread(kappa(i)) as f32).collect() }
+    }
+
+    /// What it holds.
+    pub fn entries(&self) -> &[f32] {
+        &self.entries
     }
 
     /// The spread at `kappa`, which is clamped to the table's range.
@@ -86,8 +98,7 @@ mod tests {
 
     #[test]
     fn the_table_is_as_good_as_its_cubic() {
-        let most = 65_536.0;
-        let table = SpreadTable::new(most);
+        let (most, table) = (MOST_TABULATED, &*SPREADS);
         let error = |k: f64| (concentration(table.spread(k)) / k - 1.0).abs();
         for (from, bound) in [(0.1, 2e-4), (1.0, 3e-5)] {
             let worst = decades().filter(|k| (from..most).contains(k)).map(error).fold(0.0, f64::max);

@@ -1,5 +1,6 @@
 //! What texels hold, and how it is added.
 
+use crate::distribution::effective::Rule;
 use crate::distribution::filter::Storage;
 use crate::distribution::vmf::{self, LEAST_SPREAD, Lobe};
 use crate::distribution::{literal, slope};
@@ -40,7 +41,7 @@ impl Storage {
     }
 
     /// What a lobe of a texel with this normal adds; as many numbers as [`Self::layout`] says.
-    fn encode(self, lobe: &Lobe, normal: Option<DVec3>, literal: bool) -> [f64; 8] {
+    fn encode(self, lobe: &Lobe, normal: Option<DVec3>, rule: Rule) -> [f64; 8] {
         let w = lobe.weight;
         match self {
             Self::Directions { .. } | Self::Clusters | Self::Peaks(_) | Self::Base | Self::Gaussians(_) => {
@@ -54,7 +55,11 @@ impl Storage {
                 [w * b.x, w * b.y, w * (b.x * b.x + xx), w * (b.x * b.y + xy), w * (b.y * b.y + yy), w, 0.0, 0.0]
             }
             Self::Cells(_) => {
-                let length = if literal { 1.0 - literal::spread(lobe.kappa) } else { vmf::mean_cosine(lobe.kappa) };
+                let length = match rule {
+                    Rule::Exact => vmf::mean_cosine(lobe.kappa),
+                    Rule::Literal => 1.0 - literal::spread(lobe.kappa),
+                    Rule::Tabulated => 1.0 - literal::SPREADS.spread(lobe.kappa),
+                };
                 let r = w * length * lobe.mu;
                 let n = normal.map_or(r, |normal| w * normal);
                 [r.x, r.y, r.z, w, w * length, n.x, n.y, n.z]
@@ -153,8 +158,8 @@ impl Cell {
     }
 
     /// Its lobe and the normal below.
-    pub fn lobe(&self, literal: bool, share: f64) -> Option<(Lobe, DVec3)> {
-        let kappa = if literal { literal::concentration(self.spread()) } else { vmf::concentration(self.spread()) };
+    pub fn lobe(&self, rule: Rule, share: f64) -> Option<(Lobe, DVec3)> {
+        let kappa = if rule.is_literal() { literal::concentration(self.spread()) } else { vmf::concentration(self.spread()) };
         let mu = self.sum().try_normalize().unwrap_or(DVec3::Z);
         let lobe = Lobe { mu, kappa, weight: share * self.weight() };
         (self.weight() > LEAST_WEIGHT).then_some((lobe, self.normal()))
@@ -162,12 +167,12 @@ impl Cell {
 }
 
 /// What the lobes of a texel add, lobe by lobe or cell by cell.
-pub(super) fn encode(storage: Storage, lobes: &[Lobe], normal: Option<DVec3>, literal: bool, out: &mut [f64]) {
+pub(super) fn encode(storage: Storage, lobes: &[Lobe], normal: Option<DVec3>, rule: Rule, out: &mut [f64]) {
     out.fill(0.0);
     let (_, stride) = storage.layout(lobes.len());
     for (i, lobe) in lobes.iter().enumerate() {
         let at = storage.slot(i, lobe) * stride;
-        out[at..at + stride].iter_mut().zip(storage.encode(lobe, normal, literal)).for_each(|(sum, c)| *sum += c);
+        out[at..at + stride].iter_mut().zip(storage.encode(lobe, normal, rule)).for_each(|(sum, c)| *sum += c);
     }
 }
 

@@ -40,8 +40,13 @@ impl ImageDesc {
 
     /// Bytes of the texels, without the driver's padding.
     pub fn bytes(&self) -> u64 {
-        let texels = |level| self.level_extent(level).iter().map(|&e| u64::from(e)).product::<u64>();
-        (0..self.levels).map(texels).sum::<u64>() * u64::from(self.layers.unwrap_or(1)) * texel_bytes(self.format)
+        (0..self.levels).map(|level| self.level_bytes(level)).sum()
+    }
+
+    /// Of one level.
+    pub fn level_bytes(&self, level: u32) -> u64 {
+        let texels: u64 = self.level_extent(level).iter().map(|&e| u64::from(e)).product();
+        texels * u64::from(self.layers.unwrap_or(1)) * texel_bytes(self.format)
     }
 }
 

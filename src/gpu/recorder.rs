@@ -59,6 +59,11 @@ impl<'a> Recorder<'a> {
         }
     }
 
+    /// Counts what the pass that is open moves, in the place of what it has declared: parts of images, some of them several times.
+    pub fn moved(&mut self, bytes: u64) {
+        self.bytes = bytes;
+    }
+
     pub fn end(&mut self) {
         if let Some(timer) = &mut self.timer {
             timer.end(self.cx, self.cmd, self.slot);

@@ -2,7 +2,8 @@
 
 use crate::offline::error::{Error, Result};
 use crate::offline::session::Session;
-use crate::offline::{decision, levels};
+use crate::offline::world::World;
+use crate::offline::{decision, footprint, levels};
 use crate::{Config, Estimator};
 
 /// A layer that `--aov` names.
@@ -45,9 +46,11 @@ pub enum Aov {
     Decision,
     /// Lobes that the filter found, 0 where the material's own stay.
     Lobes,
+    /// Level of the mips of the material's finest map at which it is looked up ([`footprint::mips`]).
+    Mip,
 }
 
-const ALL: [(&str, Aov); 18] = [
+const ALL: [(&str, Aov); 19] = [
     ("depth", Aov::Depth),
     ("normal", Aov::Normal),
     ("material", Aov::Material),
@@ -66,8 +69,8 @@ const ALL: [(&str, Aov); 18] = [
     ("fit-error", Aov::FitError),
     ("decision", Aov::Decision),
     ("lobes", Aov::Lobes),
+    ("mip", Aov::Mip),
 ];
-const LATER: [&str; 1] = ["mip"];
 
 impl std::str::FromStr for Aov {
     type Err = Error;
@@ -75,9 +78,6 @@ impl std::str::FromStr for Aov {
     fn from_str(name: &str) -> Result<Self> {
         if let Some((_, aov)) = ALL.iter().find(|(n, _)| *n == name) {
             return Ok(*aov);
-        }
-        if LATER.contains(&name) {
-            return Err(Error::NotSupportedYet { what: format!("--aov {name}") });
         }
         let names = ALL.map(|(n, _)| n).join(", ");
         Err(Error::argument("--aov", format!("some of {names}"), format!("`{name}`")))
@@ -134,14 +134,14 @@ impl Aov {
 
     /// Whether it is of texture coordinates.
     pub fn needs_coordinates(self) -> bool {
-        matches!(self, Self::Uv | Self::Footprint)
+        matches!(self, Self::Uv | Self::Footprint | Self::Mip)
     }
 
-    /// The layer's channels after a frame of `config`.
+    /// The layer's channels after a frame of `config` that shows `world`.
     ///
     /// # Errors
     /// The device's, on read-back.
-    pub fn read(self, session: &mut Session, config: &Config) -> Result<Vec<Channel>> {
+    pub fn read(self, session: &mut Session, world: &World, config: &Config) -> Result<Vec<Channel>> {
         let side = config.samples_per_side;
         let name = ALL.iter().find(|(_, a)| *a == self).map_or("", |(n, _)| n);
         let covered = Pixels::read(session, "ids", side)?;
@@ -228,6 +228,10 @@ impl Aov {
                 let count = |i: usize| (0..most).take_while(|k| there(i, k * layers)).count() as u32;
                 let counts = covered.of((0..samples).map(count).collect()).map(|t| t[0] as f32);
                 scalar(counts.iter().zip(mask).map(|(count, mask)| count * mask).collect())
+            }
+            Self::Mip => {
+                let mips = footprint::mips(session, world, config)?.into_iter().map(f32::to_bits).collect();
+                scalar(covered.of(mips).map(|t| f32::from_bits(t[0])))
             }
             Self::Shaded | Self::Samples => {
                 let mut shaded = vec![0; covered.words.len()];

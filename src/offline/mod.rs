@@ -10,6 +10,7 @@ pub mod decision;
 pub mod environment;
 pub mod error;
 pub mod fit_cache;
+pub mod footprint;
 pub mod gaussians_cache;
 pub mod gltf;
 pub mod headless;

@@ -114,7 +114,7 @@ pub fn render(world: &World, settings: &Settings, progress: &mut dyn FnMut(u32, 
     let chunks = settings.chunks(&config);
     let total = chunks + if settings.timed { WARM_UP + TIMED } else { 0 };
     let mut done = 0;
-    let shot = image(&mut session, settings, &config, 0, &mut |_| {
+    let shot = image(&mut session, world, settings, &config, 0, &mut |_| {
         done += 1;
         progress(done, total);
     })?;
@@ -170,10 +170,11 @@ impl Shot {
     }
 }
 
-/// What the session shows, as frame `number`, with its layers. `each` is called after every frame of the renderer, of which a
+/// What the session shows of `world`, as frame `number`, with its layers. `each` is called after every frame of the renderer, of which a
 /// reference and a supersampled image have several.
 pub(super) fn image(
     session: &mut Session,
+    world: &World,
     settings: &Settings,
     config: &Config,
     number: u32,
@@ -197,7 +198,7 @@ pub(super) fn image(
     let [width, height] = config.extent;
     let mut channels: Vec<_> = ["R", "G", "B", "A"].iter().enumerate().map(|(c, n)| (n.to_string(), channel(c))).collect();
     for aov in &settings.aovs {
-        channels.extend(aov.read(session, config)?);
+        channels.extend(aov.read(session, world, config)?);
     }
     Ok(Shot { image: LinearImage { width, height, channels }, noise: None, coverage: None })
 }
@@ -245,7 +246,7 @@ pub(super) fn report(
         ("filter", json!(settings.supersample.map_or(config.filter.name(), |_| "supersample"))),
         ("bins", json!(config.bins.name())),
         ("anisotropy", json!(config.anisotropy)),
-        ("literal_lobes", json!(config.takes_lobes_literally())),
+        ("lobe_rule", json!(config.effective_rule().name())),
         ("probes", json!(config.probes)),
         ("spc", json!(config.samples_per_cycle)),
         ("operator", json!(format!("{:?}", config.operator).to_lowercase())),
@@ -253,6 +254,7 @@ pub(super) fn report(
         ("eps", json!(config.eps)),
         ("geometric", json!(config.geometric)),
         ("estimator", json!(config.estimator.name())),
+        ("reflectance_share", json!(config.reflectance_share)),
         ("fit_lobes", json!(config.fit_lobes)),
         ("fit_error", json!(config.fit_error)),
         ("residual_errors", json!(config.residual_errors)),

@@ -173,6 +173,11 @@ impl Session {
         of_maps(renderer)
     }
 
+    /// The bytes that each pass of the last making of materials moved.
+    pub fn set_up_bytes(&self) -> &[(&'static str, u64)] {
+        self.renderer.as_ref().map_or(&[], |renderer| &renderer.set_up_bytes)
+    }
+
     /// Replaces the environment's map from the next frame on, with all that is made of it.
     ///
     /// # Errors

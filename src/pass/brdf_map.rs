@@ -4,10 +4,13 @@
 use crate::config::Config;
 use crate::distribution::expectation::GAUSSIANS;
 use crate::distribution::filter::Storage;
+use crate::distribution::literal::SPREADS;
 use crate::distribution::{Cells, Filter, MOST_BASE_LOBES, clusters, vmf};
 use crate::error::Result;
 use crate::gpu::access::Access;
+use crate::gpu::buffer::Buffer;
 use crate::gpu::image::{Image, ImageDesc};
+use crate::gpu::memory::Location;
 use crate::gpu::pipeline::{ComputePipeline, Interface, Resource, Sets, write_set};
 use crate::gpu::recorder::Recorder;
 use crate::gpu::retire::{Build, Handle, Retired};
@@ -30,7 +33,7 @@ pub const INTERFACE: Interface = Interface {
     push_bytes: size_of::<Push>() as u32,
     gbuffer: false,
     materials: false,
-    own: &[D::COMBINED_IMAGE_SAMPLER, D::COMBINED_IMAGE_SAMPLER, D::STORAGE_IMAGE],
+    own: &[D::COMBINED_IMAGE_SAMPLER, D::COMBINED_IMAGE_SAMPLER, D::STORAGE_IMAGE, D::STORAGE_BUFFER],
 };
 
 /// Sizes that the moments of one set of materials may have: beyond them the smallest take a larger one.
@@ -225,6 +228,8 @@ pub(crate) struct Work {
     first: usize,
     pushes: Vec<(usize, Push)>,
     sets: Sets,
+    /// [`SPREADS`].
+    spreads: Buffer,
 }
 
 pub(crate) struct BrdfMap {
@@ -235,7 +240,7 @@ pub(crate) struct BrdfMap {
 
 impl BrdfMap {
     pub fn new(p: &mut PassContext<'_, '_>, config: &Config) -> Result<Self> {
-        let constants = [number(config.filter), u32::from(config.takes_lobes_literally())];
+        let constants = [number(config.filter), config.effective_rule() as u32];
         let pipeline = ComputePipeline::new(p.build, p.modules, &INTERFACE, p.bridge, 0, &constants)?;
         Ok(Self { pipeline, divides: config.filter.has_cells() })
     }
@@ -250,12 +255,17 @@ impl BrdfMap {
         first: usize,
     ) -> Result<Work> {
         let sets = self.pipeline.sets(build, groups.iter().map(|g| g.sources.len()).sum())?;
+        let entries: &[u8] = bytemuck::cast_slice(SPREADS.entries());
+        let usage = vk::BufferUsageFlags::STORAGE_BUFFER;
+        let mut spreads = Buffer::new(build, "spreads", entries.len() as u64, usage, Location::Upload)?;
+        spreads.bytes_mut().copy_from_slice(entries);
         let (mut arrays, mut pushes, mut class) = (Vec::new(), Vec::new(), first);
         for group in groups {
             let views = classes[class].level_views(build)?;
             for (source, layers) in &group.sources {
                 let read = |place: Option<Place>| Resource::Sampled(classes[place.map_or(0, |p| p.0)], samplers.nearest);
-                let resources = [read(source.normal), read(source.roughness), Resource::Storage(views[0])];
+                let images = [read(source.normal), read(source.roughness), Resource::Storage(views[0])];
+                let resources: Vec<_> = images.into_iter().chain([Resource::Buffer(&spreads)]).collect();
                 write_set(&build.cx.device, sets.sets[pushes.len()], &resources);
                 pushes.push((class, Push::of(source, layers)));
             }
@@ -265,7 +275,7 @@ impl BrdfMap {
             arrays.push(Arrays { moments: (class, views), cells: of_cells });
             class += 1 + usize::from(group.layers.cells > 0);
         }
-        Ok(Work { arrays, first, pushes, sets })
+        Ok(Work { arrays, first, pushes, sets, spreads })
     }
 
     pub fn record(&self, rec: &mut Recorder<'_>, io: &Io<'_>, work: &Work) {
@@ -318,6 +328,7 @@ impl Work {
         let views = self.arrays.into_iter().flat_map(|a| a.moments.1.into_iter().chain(a.cells.into_iter().flat_map(|c| c.1)));
         views.for_each(|view| bag.push(Handle::View(view)));
         self.sets.retire(bag);
+        self.spreads.retire(bag);
     }
 }
 

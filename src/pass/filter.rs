@@ -73,7 +73,7 @@ impl Filter {
             Division::SpreadRatio => [0.0; 2],
         };
         let [one, quarters] = lengths.map(f32::to_bits);
-        let read = [config.anisotropy, config.lod_bias.to_bits(), u32::from(config.takes_lobes_literally()), one, quarters];
+        let read = [config.anisotropy, config.lod_bias.to_bits(), u32::from(config.effective_rule().is_literal()), one, quarters];
         let read = read.into_iter().chain([u32::from(config.bins == Bins::Camera), clusters]);
         let lobes = [brdf_map::number(filter), filter.lobe_layers()].into_iter().chain(read);
         let constants = [albedo, specular, normal, roughness, geometric, moments, cells];

@@ -145,6 +145,7 @@ impl Shade {
                     u32::from(ratio),
                     u32::from(config.exact_lobes),
                     u32::from(!config.estimator.combines()),
+                    (1.0 - config.reflectance_share).to_bits(),
                 ])
                 .collect();
             ComputePipeline::new(p.build, p.modules, &INTERFACE, p.bridge, p.slots, &constants)

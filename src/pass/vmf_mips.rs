@@ -187,7 +187,7 @@ impl VmfMips {
         rec.end();
     }
 
-    /// The levels of an image above its first. Where bytes count, in frames, the pass has declared it before.
+    /// The levels of an image above its first, whose bytes the pass counts by itself.
     fn record_levels(&self, rec: &mut Recorder<'_>, image: &Image, sets: &[vk::DescriptorSet]) {
         for (level, set) in (1..).zip(sets) {
             // Levels are views of their own: none is read and written through one binding.
@@ -205,8 +205,10 @@ impl VmfMips {
         }
         rec.begin(NAME);
         let divided = moments.arrays.iter().filter_map(|a| Some((a.moments.0, a.cells.as_ref()?.0)));
+        let mut moved = 0;
         for (((lobes, cells), pushes), set) in divided.zip(&work.pushes).zip(&work.cells.sets) {
             let (lobes, cells) = (io.maps.class(lobes), io.maps.class(cells));
+            moved += lobes.desc.level_bytes(0) + cells.desc.level_bytes(0);
             rec.image(lobes, Access::COMPUTE_ATOMIC);
             rec.overwrite(cells, Access::COMPUTE_WRITE);
             rec.flush();
@@ -218,9 +220,14 @@ impl VmfMips {
         let mut sets = work.levels.sets.as_slice();
         for (class, views) in moments.arrays.iter().flat_map(|a| std::iter::once(&a.moments).chain(&a.cells)) {
             let (own, rest) = sets.split_at((views.len() - 1).min(sets.len()));
-            self.record_levels(rec, io.maps.class(*class), own);
+            let image = io.maps.class(*class);
+            self.record_levels(rec, image, own);
+            // Each level is read by the next.
+            moved +=
+                (0..own.len() as u32).map(|level| image.desc.level_bytes(level) + image.desc.level_bytes(level + 1)).sum::<u64>();
             sets = rest;
         }
+        rec.moved(moved);
         rec.end();
     }
 

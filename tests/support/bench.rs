@@ -20,11 +20,15 @@ impl Folder {
     }
 
     pub fn run(&self, args: &[&str]) -> Output {
+        self.command(args).output().unwrap()
+    }
+
+    pub fn command(&self, args: &[&str]) -> Command {
         let mut command = Command::new(env!("CARGO_BIN_EXE_passband"));
         command.arg("bench").args(args).args(["--device", DEVICE]).current_dir(&self.0);
         // Caches of every system are under these.
         command.env("XDG_CACHE_HOME", self.0.join("cache")).env("HOME", &self.0);
-        command.output().unwrap()
+        command
     }
 
     /// What a silent and successful run printed, and its JSON.

@@ -49,7 +49,7 @@ pub struct Args {
     /// A device's index or part of its name (see `passband info`)
     #[arg(long, value_name = "NAME|INDEX")]
     device: Option<String>,
-    /// Write everything that was found
+    /// Write everything that was found, after each scene
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
     /// Write plots of error over time and over directions into this folder, one for each scene; of bagher over shaded pixels, too
@@ -211,28 +211,30 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         bar.set_length(total);
         bar.set_position(done);
     };
-    let json = match &order {
+    // After every scene: hours of work are not lost with the last minute's.
+    let written = |text: serde_json::Result<String>| {
+        let Some(path) = &args.json else { return Ok(()) };
+        let text = text.map_err(|e| Error::argument("--json", "numbers", e))?;
+        write_atomically(path, |file| file.write_all(text.as_bytes()))
+    };
+    match &order {
         Order::Rates(order) => {
-            let report = suites::run(order, keep, &mut progress)?;
+            let report = suites::run(order, keep, &mut progress, &mut |report| written(serde_json::to_string_pretty(report)))?;
             bar.finish_and_clear();
             crate::print(table::text(&report))?;
             if let Some(folder) = &args.plots {
                 plots(folder, &report)?;
             }
-            serde_json::to_string_pretty(&report)
+            written(serde_json::to_string_pretty(&report))?;
         }
         Order::Filters(order) => {
-            let report = xu::run(order, keep, &mut progress)?;
+            let report = xu::run(order, keep, &mut progress, &mut |report| written(serde_json::to_string_pretty(report)))?;
             bar.finish_and_clear();
             crate::print(xu_table::text(&report))?;
-            serde_json::to_string_pretty(&report)
+            written(serde_json::to_string_pretty(&report))?;
         }
-    };
-    drawn.iter().try_for_each(|path| crate::print(format_args!("figure: {}", path.display())))?;
-    if let Some(path) = &args.json {
-        let text = json.map_err(|e| Error::argument("--json", "numbers", e))?;
-        write_atomically(path, |file| file.write_all(text.as_bytes()))?;
     }
+    drawn.iter().try_for_each(|path| crate::print(format_args!("figure: {}", path.display())))?;
     Ok(ExitCode::SUCCESS)
 }
 

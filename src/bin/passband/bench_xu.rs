@@ -11,7 +11,7 @@ energy: mean radiance over the truth's; preconv.: rel. L2 where the environment 
 const COSTS: &str = "Costs on the device (Xu et al. 2017, table 1)
 set-up: brdf_map, vmf_mips, cluster_moments and mixtures, on change; shading: filter and base (or shade), in every frame; 64x: one frame of filter point with 8
 times the pixels a side; 64x over ...: its shading over the filter's, alone and with set-up; of LEAN's: shading over the filter lean's;
-ns, bytes: of set-up, and of the materials' memory beyond that with filter point (maps with mips, tables of more roughnesses), a texel";
+ns, bytes: of set-up, and of the materials' memory beyond that with filter point (maps with mips, tables of more roughnesses), a texel; mips GB/s: bytes that vmf_mips reads and writes, and the share of those that the device copies in that time";
 
 const ZOOMS: &str = "Consecutive frames of the scene's own camera against as many truths
 flicker: mean change of errors from frame to frame over the truth's mean; noise: the sequence's own; less noise: without what it and the truths'
@@ -30,7 +30,10 @@ pub fn text(report: &Report) -> String {
         parts.push(ZOOMS.into());
         parts.extend(report.zooms.iter().map(zoom));
     }
-    parts.push(COSTS.into());
+    let copy = report
+        .copy_gb_per_s
+        .map_or(String::new(), |copy| format!("\nThe device copies {:.1} GB/s (read and written)", copy.median));
+    parts.push(format!("{COSTS}{copy}"));
     parts.extend(report.scenes.iter().map(costs));
     if !report.targets.is_empty() {
         parts.push(format!("Aims\n{}", aims(&report.targets)));
@@ -139,10 +142,23 @@ fn costs(scene: &SceneReport) -> String {
             ratio(&cost.over_lean),
             cost.ns_a_texel.map_or(String::new(), |ns| format!("{ns:.1}")),
             cost.bytes_a_texel.map_or(String::new(), |bytes| format!("{bytes:.1}")),
+            cost.mips.map_or(String::new(), |mips| format!("{:.1}", mips.gb_per_s)),
+            cost.mips.and_then(|mips| mips.of_copy).map_or(String::new(), |share| format!("{share:.2}")),
         ]
     };
-    let header =
-        ["filter", "set-up ms", "shading ms", "frame ms", "64x over shading", "64x over both", "of LEAN's", "ns", "bytes"];
+    let header = [
+        "filter",
+        "set-up ms",
+        "shading ms",
+        "frame ms",
+        "64x over shading",
+        "64x over both",
+        "of LEAN's",
+        "ns",
+        "bytes",
+        "mips GB/s",
+        "of copies",
+    ];
     let rows = scene.rows.iter().filter_map(|r| Some(row(r.filter, r.cost.as_ref()?)));
     let all = rows.chain([row("64x", &scene.supersampling)]);
     format!("{}, {}, {} texels\n{}", title(scene), scene.estimator, scene.texels, aligned(&header, 1, all))

@@ -2,6 +2,7 @@
 
 use clap::ValueEnum;
 use indicatif::{ProgressBar, ProgressStyle};
+use passband::distribution::effective::Rule;
 use passband::frequency::allocation::Allocation;
 use passband::frequency::operators::Combine;
 use passband::offline::error::{Error, Result};
@@ -110,6 +111,8 @@ enum Literal {
     /// Xu et al. 2017 for --filter vmf1, vmf4, vmf8 and vmf: concentrations by equations 8 and 9, normals and lobes joined by 13 and
     /// 14, cells divided by the length of their mean vectors
     Xu,
+    /// The same, lengths from a table of 1024 concentrations, as it is rendered there
+    XuTable,
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -197,7 +200,7 @@ impl Args {
         let supersample = self.filter == "supersample";
         let predicted = self.probes.is_some()
             || self.spc.is_some()
-            || self.literal.iter().any(|form| *form != Literal::Xu)
+            || self.literal.iter().any(|form| !matches!(form, Literal::Xu | Literal::XuTable))
             || self.aov.iter().any(|layer| ["bandwidth", "spread"].contains(&layer.as_str()))
             || base.allocation != Allocation::Constant;
         let everywhere = supersample || matches!(self.estimator, Some(Method::Preconvolved | Method::Cv));
@@ -234,6 +237,11 @@ impl Args {
         let filter = Filter::ALL.into_iter().find(|filter| filter.name() == name);
         let filter = filter.ok_or_else(|| Error::NotSupportedYet { what: format!("--filter {}", self.filter) })?;
         let literal = |form| self.literal.contains(&form);
+        let lobe_rule = match () {
+            () if literal(Literal::XuTable) => Rule::Tabulated,
+            () if literal(Literal::Xu) => Rule::Literal,
+            () => Rule::Exact,
+        };
         let config = Config {
             rate,
             probes: self.probes.unwrap_or(base.probes),
@@ -241,8 +249,8 @@ impl Args {
             combine: if literal(Literal::Eq4) { Combine::Literal } else { base.combine },
             allocation: if literal(Literal::Eq8) { Allocation::Equation8 } else { base.allocation },
             filter,
-            literal_lobes: literal(Literal::Xu),
-            division: if literal(Literal::Xu) && base.division == Division::default() {
+            lobe_rule,
+            division: if lobe_rule.is_literal() && base.division == Division::default() {
                 Division::PRINTED
             } else {
                 base.division

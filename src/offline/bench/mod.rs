@@ -4,6 +4,7 @@
 //! are stated at equal error and at equal time, against full rate with the same and with the default estimator.
 
 pub mod cases;
+pub mod copy_rate;
 pub mod curves;
 pub mod environment;
 pub mod equal;

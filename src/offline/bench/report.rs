@@ -29,6 +29,8 @@ pub struct Head {
     pub preset: &'static str,
     /// Timed frames of each variant.
     pub rounds: u32,
+    /// Whether it holds all scenes: not while the run goes on, and not after an interruption.
+    pub complete: bool,
     /// The device; absent if every scene was skipped.
     pub device: Option<DeviceInfo>,
 }
@@ -36,7 +38,7 @@ pub struct Head {
 impl Head {
     /// Of a run whose device is not known yet.
     pub fn new(suite: &'static str, preset: &'static str, rounds: u32) -> Self {
-        Self { schema: 1, passband: env!("CARGO_PKG_VERSION"), suite, preset, rounds, device: None }
+        Self { schema: 1, passband: env!("CARGO_PKG_VERSION"), suite, preset, rounds, complete: false, device: None }
     }
 }
 

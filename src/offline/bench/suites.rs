@@ -122,12 +122,16 @@ pub type Progress<'a> = dyn FnMut(&str, u64, u64) + 'a;
 pub type Keep<'a> = dyn FnMut(&str, Figure) -> Result<()> + 'a;
 
 /// Runs a suite. `keep` is given the figures of scenes that are named in the order, and of those of the quick preset; without,
-/// none are drawn.
+/// none are drawn. `found` is given the report so far after each scene, so that an interruption costs no more than one.
 ///
 /// # Errors
-/// Of the scenes, the device or the driver, and of `keep`.
-pub fn run(order: &Order, keep: Option<&mut Keep<'_>>, progress: &mut Progress<'_>) -> Result<Report> {
-    let clock = Instant::now();
+/// Of the scenes, the device or the driver, of `keep` and of `found`.
+pub fn run(
+    order: &Order,
+    keep: Option<&mut Keep<'_>>,
+    progress: &mut Progress<'_>,
+    found: &mut dyn FnMut(&Report) -> Result<()>,
+) -> Result<Report> {
     let mut report = Report {
         head: Head::new(order.suite.name(), order.preset.name(), order.rounds.unwrap_or(order.preset.rounds())),
         scenes: Vec::new(),
@@ -138,7 +142,7 @@ pub fn run(order: &Order, keep: Option<&mut Keep<'_>>, progress: &mut Progress<'
         targets: Vec::new(),
         seconds: Seconds::default(),
     };
-    let mut run = Run { order, report: &mut report, keep, progress, known: Vec::new() };
+    let mut run = Run { order, clock: Instant::now(), report: &mut report, keep, progress, found, known: Vec::new() };
     let default = matches!(order.suite, Suite::Passes).then(|| {
         let count = if order.preset == Preset::Quick { 1 } else { PASSES_SCENES.len() };
         PASSES_SCENES.iter().take(count).map(|name| name.to_string()).collect::<Vec<_>>()
@@ -157,25 +161,18 @@ pub fn run(order: &Order, keep: Option<&mut Keep<'_>>, progress: &mut Progress<'
             }
         }
     }
-    report.summary = gains(&report.scenes);
-    if order.suite == Suite::Bagher {
-        report.table = table::lines(&report.scenes);
-        report.targets = table::targets(&report.scenes, &report.table);
-    }
-    if order.suite == Suite::Residual {
-        report.reached = reached::lines(&report.scenes);
-        report.targets = reached::targets(&report.reached);
-    }
-    report.seconds.total = clock.elapsed().as_secs_f64();
+    report.head.complete = true;
     Ok(report)
 }
 
 /// A run and what it has found so far.
 struct Run<'a, 'k, 'p> {
     order: &'a Order,
+    clock: Instant,
     report: &'a mut Report,
     keep: Option<&'a mut Keep<'k>>,
     progress: &'a mut Progress<'p>,
+    found: &'a mut dyn FnMut(&Report) -> Result<()>,
     /// Sizes of environments whose cost is known.
     known: Vec<[u32; 2]>,
 }
@@ -225,7 +222,26 @@ impl Run<'_, '_, '_> {
             }
         }
         self.report.scenes.push(found);
-        Ok(())
+        self.conclude();
+        (self.found)(self.report)
+    }
+
+    /// What follows from the scenes so far.
+    fn conclude(&mut self) {
+        let report = &mut *self.report;
+        report.summary = gains(&report.scenes);
+        match self.order.suite {
+            Suite::Passes => (),
+            Suite::Bagher => {
+                report.table = table::lines(&report.scenes);
+                report.targets = table::targets(&report.scenes, &report.table);
+            }
+            Suite::Residual => {
+                report.reached = reached::lines(&report.scenes);
+                report.targets = reached::targets(&report.reached);
+            }
+        }
+        report.seconds.total = self.clock.elapsed().as_secs_f64();
     }
 
     /// What `map` costs pre-convolved in every frame, and at half of its size; nothing for a size that is known.

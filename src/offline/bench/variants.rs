@@ -53,9 +53,9 @@ const fn further(name: &'static str, change: fn(&mut Config)) -> Family {
 /// Samples a cycle that no frame has: the prediction gives up, and what is left of its cost is what is of interest.
 const HOPELESS: f32 = 1e6;
 
-/// Full rate with each estimator is the ladder on which gains are found: it has more directions than the others, and fewer.
+/// Full rate with each estimator is the ladder on which gains are found; that of the one that needs more directions reaches further.
 pub const BAGHER: &[Family] = &[
-    Family { directions: &[64, 4, 16, 256], more: &[1024], ..FULL },
+    Family { directions: &[64, 4, 16, 256], ..FULL },
     Family { name: "full brdf-random", estimator: Estimator::BrdfRandom, directions: &[64, 256], more: &[16, 1024], ..FULL },
     compared(HALF),
     compared(Family { name: "quarter", rate: Rate::Uniform(2), ..FULL }),
@@ -93,6 +93,9 @@ pub const RESIDUAL: &[Family] = &[
     Family { name: "bandwidth", directions: &[64], more: &[16, 256], ..BANDWIDTH },
     base("base lobes=4", |c| c.fit_lobes = 4),
     base("base lobes=8", |c| c.fit_lobes = 8),
+    share("cv share=.25", |c| c.reflectance_share = 0.25),
+    share("cv share=.75", |c| c.reflectance_share = 0.75),
+    further_residual("residual share=.75", |c| c.reflectance_share = 0.75),
     further_residual("residual above .05", |c| c.residual_errors = [0.05, 0.1, 0.25]),
     further_residual("residual above .2", |c| c.residual_errors = [0.2, 0.2, 0.25]),
 ];
@@ -100,6 +103,11 @@ pub const RESIDUAL: &[Family] = &[
 /// Another fit than the default, in the full preset.
 const fn base(name: &'static str, change: fn(&mut Config)) -> Family {
     Family { rate: Rate::Full, estimator: Estimator::Preconvolved, more: &[1], ..further(name, change) }
+}
+
+/// Another share of directions from what the lobes leave than half, in the full preset.
+const fn share(name: &'static str, change: fn(&mut Config)) -> Family {
+    Family { rate: Rate::Full, estimator: Estimator::Cv, more: &[16], ..further(name, change) }
 }
 
 const fn further_residual(name: &'static str, change: fn(&mut Config)) -> Family {

@@ -1,5 +1,6 @@
 //! Direct light at one point by globally adaptive quadrature.
 
+use crate::distribution::effective::Rule;
 use crate::distribution::{Division, Filter};
 use crate::material::Sampling;
 use crate::offline::reference::environment::{Parts, Region, Tree};
@@ -21,8 +22,8 @@ pub struct Options {
     pub sampling: Sampling,
     /// What divides cells.
     pub division: Division,
-    /// [`crate::Config::literal_lobes`].
-    pub literal_lobes: bool,
+    /// [`crate::Config::lobe_rule`].
+    pub lobe_rule: Rule,
 }
 
 impl Default for Options {
@@ -33,7 +34,7 @@ impl Default for Options {
             filter: Filter::Point,
             sampling: Sampling::default(),
             division: Division::default(),
-            literal_lobes: false,
+            lobe_rule: Rule::default(),
         }
     }
 }

@@ -100,8 +100,7 @@ pub fn trace(world: &World, extent: [u32; 2], options: &Options) -> Result<Vec<O
         }
     }
     let materials: Vec<_> = world.materials.iter().map(|m| m.surface()).collect();
-    let moments: Vec<_> =
-        materials.iter().map(|m| Moments::of(m, options.filter, options.division, options.literal_lobes)).collect();
+    let moments: Vec<_> = materials.iter().map(|m| Moments::of(m, options.filter, options.division, options.lobe_rule)).collect();
     let hits = rays.iter().zip(nearest).enumerate().map(|(i, (ray, found))| {
         let found = found?;
         let object = world.objects.get(found.object)?;

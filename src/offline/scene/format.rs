@@ -272,6 +272,7 @@ pub(super) struct Settings {
     pub anisotropy: Key<f64>,
     pub lod_bias: Key<f64>,
     pub geometric: Key<bool>,
+    pub reflectance_share: Key<f64>,
     pub fit_lobes: Key<u32>,
     pub fit_error: Key<f64>,
     #[serde(default, deserialize_with = "some_exactly")]

@@ -126,6 +126,7 @@ impl Scene {
                 [one, quarters] => Division::Lengths([one.unwrap_or(PRINTED_LENGTHS[0]), quarters.unwrap_or(PRINTED_LENGTHS[1])]),
             },
             geometric: settings.geometric.as_ref().map_or(base.geometric, |v| *v.get_ref()),
+            reflectance_share: settings.reflectance_share.as_ref().map_or(base.reflectance_share, |v| *v.get_ref() as f32),
             fit_lobes: settings.fit_lobes.as_ref().map_or(base.fit_lobes, |v| *v.get_ref()),
             fit_error: settings.fit_error.as_ref().map_or(base.fit_error, |v| *v.get_ref()),
             residual_errors: settings.residual_errors.as_ref().map_or(base.residual_errors, |v| v.get_ref().map(|e| e as f32)),

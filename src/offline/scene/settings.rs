@@ -19,6 +19,7 @@ impl Check<'_> {
         self.each(&s.lmax, |c, v| c.require(*v.get_ref() <= 5, &v.span(), "a level from 0 to 5", v.get_ref()))?;
         self.each(&s.anisotropy, |c, v| c.number(v, "1 to 16", |v| (1.0..=16.0).contains(&v)))?;
         self.each(&s.lod_bias, |c, v| c.number(v, "-16 to 16", |v| v.abs() <= 16.0))?;
+        self.each(&s.reflectance_share, |c, v| c.number(v, "0 < share < 1", |v| v > 0.0 && v < 1.0))?;
         self.each(&s.fit_lobes, |c, v| {
             c.require((1..=24).contains(v.get_ref()), &v.span(), "a whole number from 1 to 24", v.get_ref())
         })?;

@@ -102,6 +102,7 @@ mod tests {
             }),
             cost: Some(Cost {
                 set_up_ms: Some(times(set_up)),
+                mips: None,
                 shade_ms: times(1.0),
                 frame_ms: times(2.0),
                 gain: ratio(gain),

@@ -12,6 +12,7 @@ mod times;
 mod truths;
 mod zoom;
 
+use crate::offline::bench::copy_rate;
 use crate::offline::bench::reference::Goal;
 use crate::offline::bench::report::{Head, Seconds};
 use crate::offline::bench::suites::{Keep, Preset, Progress};
@@ -110,23 +111,31 @@ pub fn cache_folder() -> Option<PathBuf> {
 /// The error that a truth's noise has to be below is the smallest over this.
 const MARGIN: f64 = 10.0;
 
-/// Runs the suite. `keep` is given a strip of images of each scene and light; without, none are drawn.
+/// Runs the suite. `keep` is given a strip of images of each scene and light; without, none are drawn. `found` is given the
+/// report so far after each scene and light.
 ///
 /// # Errors
-/// Of the scenes, the device or the driver, and of `keep`. What a filter refuses is an empty row.
-pub fn run(order: &Order, mut keep: Option<&mut Keep<'_>>, progress: &mut Progress<'_>) -> Result<Report> {
+/// Of the scenes, the device or the driver, of `keep` and of `found`. What a filter refuses is an empty row.
+pub fn run(
+    order: &Order,
+    mut keep: Option<&mut Keep<'_>>,
+    progress: &mut Progress<'_>,
+    found: &mut dyn FnMut(&Report) -> Result<()>,
+) -> Result<Report> {
     let clock = Instant::now();
     let mut report = Report {
         head: Head::new(order.suite.name(), order.preset.name(), order.rounds.unwrap_or(order.preset.frames_timed())),
         scenes: Vec::new(),
         zooms: Vec::new(),
         skipped: Vec::new(),
+        copy_gb_per_s: None,
         targets: Vec::new(),
         seconds: Seconds::default(),
     };
     // A name that is none is known before the work begins.
     let own = order.scenes.iter().map(|name| Shot::of(name)).collect::<Result<Vec<_>>>()?;
     let shots = if own.is_empty() { cases::shots(order, &mut report.skipped)? } else { own };
+    report.copy_gb_per_s = copy_rate::measure(&order.device, report.head.rounds)?;
     for Shot { scene, frame } in shots {
         progress(&format!("{}: loading", scene.name()), 0, 1);
         let mut animated = scene.animated()?;
@@ -138,23 +147,25 @@ pub fn run(order: &Order, mut keep: Option<&mut Keep<'_>>, progress: &mut Progre
         let config = scene.config(order.extent.unwrap_or(order.preset.still()));
         for light in Light::ALL {
             let stage = Stage { order, light, world: light.alone_in(&world)?, config: &config, rounds: report.head.rounds };
-            let found = stage.measure(&mut report, &mut keep, progress)?;
-            report.scenes.push(found);
+            let scene = stage.measure(&mut report, &mut keep, progress)?;
+            report.scenes.push(scene);
             if cameras.len() > 1 {
                 let name = format!("{}, {}", stage.world.name, light.name());
                 let mut told = |what: &str, done, total| progress(&format!("{name}: {what}"), done, total);
                 let zoom = zoom::measure(&stage, &cameras, &mut report.seconds.references, &mut told)?;
                 report.zooms.push(zoom);
             }
+            report.targets = match order.suite {
+                Suite::Xu => aims::targets(&report.scenes),
+                Suite::Tan => Vec::new(),
+            };
+            // Those of clusters are of any scenes.
+            report.targets.extend(aims_tan::targets(&report.scenes, &report.zooms));
+            report.seconds.total = clock.elapsed().as_secs_f64();
+            found(&report)?;
         }
     }
-    report.targets = match order.suite {
-        Suite::Xu => aims::targets(&report.scenes),
-        Suite::Tan => Vec::new(),
-    };
-    // Those of clusters are of any scenes.
-    report.targets.extend(aims_tan::targets(&report.scenes, &report.zooms));
-    report.seconds.total = clock.elapsed().as_secs_f64();
+    report.head.complete = true;
     Ok(report)
 }
 
@@ -182,6 +193,20 @@ impl Stage<'_> {
         // Those that read texels look nothing up along a footprint (Tan et al. 2005, figure 7).
         let anisotropy = if matches!(filter, Filter::Fournier4 | Filter::Fournier7) { 1 } else { self.config.anisotropy };
         Config { frames_in_flight: 1, filter, extent, estimator, directions, anisotropy, ..self.config.clone() }
+    }
+
+    /// A session for frames of which differences from one to the next matter, or why there is none; and whether anything is drawn in them:
+    /// under an environment light is looked up, unless a material refuses that.
+    fn moving(&self, filter: Filter, extent: [u32; 2], directions: u32) -> Result<(std::result::Result<Session, String>, bool)> {
+        let drawing = self.config(filter, extent, directions);
+        if self.light == Light::Environment {
+            let looking_up = Config { estimator: Estimator::Preconvolved, ..drawing.clone() };
+            if let Ok(session) = open(&self.world, &looking_up, self.device())? {
+                return Ok((Ok(session), filter.is_random()));
+            }
+        }
+        let drawn = filter.is_random() || self.light == Light::Environment;
+        Ok((open(&self.world, &drawing, self.device())?, drawn))
     }
 
     fn measure(&self, report: &mut Report, keep: &mut Option<&mut Keep<'_>>, progress: &mut Progress<'_>) -> Result<SceneReport> {
@@ -215,7 +240,7 @@ impl Stage<'_> {
             Preset::Quick => None,
             Preset::Full => Some(motion::flicker(self, &mut rows, report, &mut told)?),
         };
-        let cost = times::measure(self, &mut rows, &mut |done, total| told("frames", done, total))?;
+        let cost = times::measure(self, &mut rows, report.copy_gb_per_s, &mut |done, total| told("frames", done, total))?;
         if let Some(keep) = keep.as_mut() {
             keep(&self.world.name, strips::strip(self, &truth, &stills, &rows))?;
         }

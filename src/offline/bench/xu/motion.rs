@@ -4,7 +4,7 @@ use crate::offline::bench::quality::Frame;
 use crate::offline::bench::reference::Goal;
 use crate::offline::bench::xu::report::{Flicker, Report, Row};
 use crate::offline::bench::xu::truths::Truths;
-use crate::offline::bench::xu::{Stage, finite, open, stills};
+use crate::offline::bench::xu::{Stage, finite, stills};
 use crate::offline::error::Result;
 use crate::offline::metrics::{Pair, Picture, flicker as measure};
 use crate::offline::world::Camera;
@@ -17,7 +17,7 @@ pub const FRAMES: u32 = 16;
 const MOST_SIDE: u32 = 128;
 /// Joint sub-samples of each truth: fewer than of a still, as there are many. What their noise makes of flicker is reported.
 const SAMPLES: u32 = 512;
-/// Directions of a frame under an environment.
+/// Directions of a frame under an environment that a material does not let be looked up.
 const DIRECTIONS: u32 = 256;
 /// Of frames.
 const SEED: u32 = 4;
@@ -81,9 +81,7 @@ pub(super) fn flicker(
         for (done, ((filter, row), found)) in (1..).zip(filters.iter().copied().zip(rows.iter()).zip(&mut found)) {
             // What is drawn anew in each frame flickers by that.
             let session = match row.refused {
-                None if !filter.is_random() => {
-                    open(&stage.world, &stage.config(filter, extent, DIRECTIONS), stage.device())?.ok()
-                }
+                None if !filter.is_random() => stage.moving(filter, extent, DIRECTIONS)?.0.ok(),
                 _ => None,
             };
             if let Some(mut session) = session {

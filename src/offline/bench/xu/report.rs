@@ -24,6 +24,8 @@ pub struct Report {
     pub skipped: Vec<Skipped>,
     /// What was aimed at, as far as it was measured.
     pub targets: Vec<Target>,
+    /// Bytes that the device copies a nanosecond, read and written; absent without timestamps.
+    pub copy_gb_per_s: Option<Summary>,
     /// Wall times of the run; `references` are truths.
     pub seconds: Seconds,
 }
@@ -171,6 +173,8 @@ pub struct Moving {
 pub struct Cost {
     /// `brdf_map`, `vmf_mips`, `cluster_moments` and `mixtures`, on change; absent without maps of the filter's own.
     pub set_up_ms: Option<Summary>,
+    /// How fast `vmf_mips` moves bytes; absent where it does nothing.
+    pub mips: Option<Rate>,
     /// `filter` and `base` (or `shade`), in every frame.
     pub shade_ms: Summary,
     /// All passes of a frame.
@@ -186,6 +190,19 @@ pub struct Cost {
     /// Device memory of the materials beyond that with the filter `point`, a texel: maps with their mips, and importance tables
     /// where filters need those of more roughnesses.
     pub bytes_a_texel: Option<f64>,
+}
+
+/// Bytes that a pass moves, and how fast.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Rate {
+    /// Milliseconds of the pass.
+    pub ms: Summary,
+    /// Read and written.
+    pub bytes: u64,
+    /// By the median of the times.
+    pub gb_per_s: f64,
+    /// Over the rate at which the device copies.
+    pub of_copy: Option<f64>,
 }
 
 impl Row {

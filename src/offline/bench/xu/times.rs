@@ -6,13 +6,13 @@
 use crate::gpu::timer::FrameTimings;
 use crate::offline::bench::runner::{Timed, WARM_UP, interleave};
 use crate::offline::bench::statistics::{Summary, ratio_of_medians};
-use crate::offline::bench::xu::report::{Cost, Row};
+use crate::offline::bench::xu::report::{Cost, Rate, Row};
 use crate::offline::bench::xu::{Stage, open};
 use crate::offline::error::{Error, Result};
 use crate::offline::headless::DeviceInfo;
 use crate::offline::session::Session;
 use crate::offline::world::World;
-use crate::pass::{base, filter, shade};
+use crate::pass::{base, filter, shade, vmf_mips};
 use crate::{Config, Estimator, Filter};
 use std::sync::Arc;
 
@@ -40,6 +40,8 @@ struct Subject<'a> {
     rounds: u32,
     /// Of every timed frame.
     set_up_ms: Vec<f64>,
+    /// Of the pass that makes mips.
+    mips_ms: Vec<f64>,
 }
 
 impl Timed for Subject<'_> {
@@ -48,6 +50,7 @@ impl Timed for Subject<'_> {
         if timed && self.filter.is_some_and(Filter::stores) {
             let times = self.session.renew_materials(self.world)?;
             self.set_up_ms.push(times.iter().map(|(_, ms)| ms).sum());
+            self.mips_ms.extend(times.iter().filter(|(name, _)| *name == vmf_mips::NAME).map(|(_, ms)| ms));
         }
         self.session.frame(seed)
     }
@@ -57,8 +60,13 @@ impl Timed for Subject<'_> {
     }
 }
 
-/// Times of every filter that took the still, into its row.
-pub(super) fn measure(stage: &Stage<'_>, rows: &mut [Row], progress: &mut dyn FnMut(u64, u64)) -> Result<Costs> {
+/// Times of every filter that took the still, into its row; `copy` is how fast the device copies.
+pub(super) fn measure(
+    stage: &Stage<'_>,
+    rows: &mut [Row],
+    copy: Option<Summary>,
+    progress: &mut dyn FnMut(u64, u64),
+) -> Result<Costs> {
     let config = |filter, extent, estimator| {
         let directions = if estimator == Estimator::Mis { DIRECTIONS } else { 1 };
         Config { estimator, directions, ..stage.config(filter, extent, DIRECTIONS) }
@@ -66,7 +74,14 @@ pub(super) fn measure(stage: &Stage<'_>, rows: &mut [Row], progress: &mut dyn Fn
     let subject = |filter: Option<Filter>, extent, estimator| -> Result<std::result::Result<Subject<'_>, String>> {
         let world = &stage.world;
         let session = open(world, &config(filter.unwrap_or_default(), extent, estimator), stage.device())?;
-        Ok(session.map(|session| Subject { session, world, filter, rounds: stage.rounds, set_up_ms: Vec::new() }))
+        Ok(session.map(|session| Subject {
+            session,
+            world,
+            filter,
+            rounds: stage.rounds,
+            set_up_ms: Vec::new(),
+            mips_ms: Vec::new(),
+        }))
     };
     let extent = stage.config.extent;
     let mut estimator = (Estimator::Preconvolved, "preconvolved");
@@ -103,9 +118,16 @@ pub(super) fn measure(stage: &Stage<'_>, rows: &mut [Row], progress: &mut dyn Fn
         let has_maps = set_up.iter().any(|ms| *ms > 0.0);
         let set_up_ms = has_maps.then(|| Summary::of(set_up));
         let is_filter = subject.filter.is_some();
+        let bytes = subject.session.set_up_bytes().iter().find(|(name, _)| *name == vmf_mips::NAME).map(|(_, bytes)| *bytes);
+        let mips = bytes.filter(|_| subject.mips_ms.iter().any(|ms| *ms > 0.0)).map(|bytes| {
+            let ms = Summary::of(&subject.mips_ms);
+            let gb_per_s = bytes as f64 / (ms.median * 1e6);
+            Rate { ms, bytes, gb_per_s, of_copy: copy.map(|copy| gb_per_s / copy.median) }
+        });
         let each = |total: f64| (has_maps && texels > 0).then(|| total / texels as f64);
         Cost {
             set_up_ms,
+            mips,
             shade_ms: Summary::of(&shade),
             frame_ms: Summary::of(&spans(times)),
             gain: ratio_of_medians(&supersampled, &shade).filter(|_| is_filter),

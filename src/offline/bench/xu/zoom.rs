@@ -1,6 +1,7 @@
 //! A scene's own camera motion, frame by frame: how errors change between consecutive frames, and how the sequence looks beside its
 //! truth (Tan et al. 2005, figure 4).
 
+use crate::Filter;
 use crate::offline::animation::AnimatedWorld;
 use crate::offline::bench::quality::Frame;
 use crate::offline::bench::reference::Goal;
@@ -8,12 +9,11 @@ use crate::offline::bench::suites::Preset;
 use crate::offline::bench::xu::cases::Light;
 use crate::offline::bench::xu::report::{Zoom, ZoomRow};
 use crate::offline::bench::xu::truths::Truths;
-use crate::offline::bench::xu::{Stage, finite, open, stills};
+use crate::offline::bench::xu::{Stage, finite, stills};
 use crate::offline::error::Result;
 use crate::offline::metrics::{Exposure, Pair, Picture, compare};
 use crate::offline::session::Session;
 use crate::offline::world::Camera;
-use crate::{Config, Estimator, Filter};
 use std::time::Instant;
 
 /// Those that are compared, if they are ordered.
@@ -114,24 +114,15 @@ pub(super) fn measure(
     Ok(Zoom { scene, light: stage.light, extent, frames: cameras.len(), samples: samples.into(), noise, noise_jod, rows })
 }
 
-/// The frames of one filter, or why there are none. Under an environment it is looked up, where no material refuses that.
+/// The frames of one filter, or why there are none.
 fn sequence(
     stage: &Stage<'_>,
     filter: Filter,
     extent: [u32; 2],
     cameras: &[Camera],
 ) -> Result<std::result::Result<Sequence, String>> {
-    let drawing = stage.config(filter, extent, DIRECTIONS);
-    let looking_up = Config { estimator: Estimator::Preconvolved, ..drawing.clone() };
-    let mut drawn = if filter.is_random() { DRAWN } else { 1 };
-    let mut session = match stage.light {
-        Light::Point => open(&stage.world, &drawing, stage.device())?,
-        Light::Environment => open(&stage.world, &looking_up, stage.device())?,
-    };
-    if session.is_err() && stage.light == Light::Environment {
-        drawn = DRAWN;
-        session = open(&stage.world, &drawing, stage.device())?;
-    }
+    let (session, drawn) = stage.moving(filter, extent, DIRECTIONS)?;
+    let drawn = if drawn { DRAWN } else { 1 };
     let mut session = match session {
         Ok(session) => session,
         Err(reason) => return Ok(Err(reason)),
