@@ -235,7 +235,7 @@ fn statistics_and_layers_say_what_was_drawn() {
         let aovs = vec![Aov::Samples, Aov::Shaded];
         let config = Config { rate: Rate::Bandwidth, allocation, directions: 32, ..Config::new([160, 120]) };
         let base = Settings { aovs, ..Settings::new(config) };
-        let rendered = render(&world, &Settings { device: device.clone(), ..base }, &mut |_, _| {}).unwrap();
+        let rendered = render(&world, &Settings { device: device.clone(), ..base }, &mut |_, _, _| {}).unwrap();
         let layer = |name| rendered.image.channel(name).unwrap().iter().map(|v| f64::from(*v)).collect::<Vec<_>>();
         let (drawn, shaded) = (layer("samples.Y"), layer("shaded.Y"));
         let samples = &rendered.stats.samples;

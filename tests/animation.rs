@@ -169,7 +169,7 @@ fn frames(world: &mut AnimatedWorld, settings: &Settings, frames: Range<u32>) ->
         images.push(image);
         Ok(())
     };
-    let stats = render_frames(world, settings, frames.clone(), &mut |_, _| {}, &mut write).unwrap();
+    let stats = render_frames(world, settings, frames.clone(), &mut |_, _, _| {}, &mut write).unwrap();
     assert_eq!(stats.validation_messages, [""; 0]);
     (images, stats)
 }
@@ -189,7 +189,7 @@ fn a_frame_is_the_same_alone_and_among_others_and_a_plain_render_is_the_first() 
         assert!(alone[0].channels == all[2].channels, "{rate:?}");
         assert!(stats.frame_ms.median > 0.0 && stats.setup_ms["animation"] > 0.0 && stats.pixels.shaded > 0);
         world.show(0);
-        let plain = render(world.world(), &settings(rate), &mut |_, _| {}).unwrap();
+        let plain = render(world.world(), &settings(rate), &mut |_, _, _| {}).unwrap();
         assert!(plain.image.channels == all[0].channels, "{rate:?}");
     }
     // What follows the frame before does so whether frames are timed or not.

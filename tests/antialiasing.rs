@@ -84,7 +84,7 @@ fn statistics_count_levels_and_the_directions_that_they_share() {
     let world = scene("sphere");
     let stats = |rate: Rate, side| {
         let settings = Settings::new(Config { rate, samples_per_side: side, ..Config::new([64; 2]) });
-        render::render(&world, &settings, &mut |_, _| ()).unwrap().stats
+        render::render(&world, &settings, &mut |_, _, _| ()).unwrap().stats
     };
     for (side, directions) in [(2, &[(-1, 32), (0, 128)][..]), (4, &[(-2, 16), (-1, 64), (0, 256)])] {
         let found = stats(Rate::Bandwidth, side);

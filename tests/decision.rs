@@ -40,7 +40,7 @@ fn fit() -> &'static LobeFit {
 fn layers(world: &World, config: Config, aovs: &[Aov]) -> LinearImage {
     let device = Options { device: Some(DEVICE.into()), validate: true };
     let settings = Settings { aovs: aovs.to_vec(), device, ..Settings::new(config) };
-    let rendered = render(world, &settings, &mut |_, _| {}).unwrap();
+    let rendered = render(world, &settings, &mut |_, _, _| {}).unwrap();
     assert_eq!(rendered.stats.validation_messages, [""; 0]);
     rendered.image
 }

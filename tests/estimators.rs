@@ -181,6 +181,75 @@ fn a_small_sun_in_a_mirror_is_not_noisy() {
     assert!(mean.deviation() < 2.5e-3, "{}", mean.deviation());
 }
 
+/// The mean of some frames at each pixel, and the variance of that, summed over channels.
+struct Averaged {
+    mean: Vec<DVec3>,
+    variance: Vec<f64>,
+}
+
+impl Averaged {
+    fn new(world: &World, config: &Config, seed: u32) -> Self {
+        const FRAMES: u32 = 16;
+        let mut stage = Stage::new(world, config);
+        let mut sums = Vec::new();
+        for frame in 0..FRAMES {
+            let image = stage.frame([seed, frame]);
+            sums.resize(image.texels.len(), [DVec3::ZERO; 2]);
+            for (i, [sum, squares]) in sums.iter_mut().enumerate() {
+                let radiance = image.radiance(i);
+                *sum += radiance;
+                *squares += radiance * radiance;
+            }
+        }
+        let n = f64::from(FRAMES);
+        let variance = |[sum, squares]: &[DVec3; 2]| (squares - sum * sum / n).element_sum() / (n * (n - 1.0));
+        Self { variance: sums.iter().map(variance).collect(), mean: sums.iter().map(|[sum, _]| sum / n).collect() }
+    }
+
+    /// How far `self` is from `other` beyond what the noise of both says, in dB; the difference of the means over the mean; and the
+    /// latter's standard error.
+    fn beside(&self, other: &Self) -> [f64; 3] {
+        let mut sums = [0.0; 5];
+        let all = self.mean.iter().zip(&other.mean).zip(self.variance.iter().zip(&other.variance));
+        for ((a, b), (of_a, of_b)) in all.filter(|((_, b), _)| b.element_sum() > 0.0) {
+            // Relative to the pixel, so that no few of them are all.
+            let weight = 1.0 / b.length_squared();
+            let (difference, noise) = ((a - b).length_squared(), of_a + of_b);
+            let terms = [weight * difference, weight * noise, (a - b).element_sum(), b.element_sum(), noise];
+            sums.iter_mut().zip(terms).for_each(|(sum, term)| *sum += term);
+        }
+        let [difference, noise, signed, all, variance] = sums;
+        [10.0 * (difference / noise).log10(), signed / all, variance.sqrt() / all]
+    }
+}
+
+/// Taken to be what look-ups hold of them, lobes leave nothing that makes `cv` differ from plain sampling but its noise; as they are looked up
+/// in frames they leave nearly nothing.
+#[test]
+#[ignore = "minutes"]
+fn looked_up_light_changes_no_mean_on_six_scenes() {
+    let coated = ggx(0.3, DVec3::new(0.6, 0.3, 0.05), DVec3::new(0.1, 0.3, 0.6));
+    let scenes = [
+        ("sphere", table("metallic-paint"), "sun-sky"),
+        ("sphere", table("rough"), "studio"),
+        ("bumpy-sphere", table("mirror-metal"), "studio"),
+        ("bumpy-sphere", coated, "sun-sky"),
+        ("torus-knot", table("satin"), "studio"),
+        ("torus-knot", table("gloss-plastic"), "sun-sky"),
+    ];
+    for (mesh, model, light) in scenes {
+        let world = world(mesh, 64, model, sky(light));
+        let of = |estimator, exact_lobes, seed| {
+            Averaged::new(&world, &Config { exact_lobes, ..config([128, 128], estimator, 2048) }, seed)
+        };
+        let plain = of(Estimator::Mis, false, 1);
+        let [beyond, exact, error] = of(Estimator::Cv, true, 2).beside(&plain);
+        let [_, in_frames, _] = of(Estimator::Cv, false, 3).beside(&plain);
+        println!("{mesh} {light}: {beyond:+.3} dB, mean {exact:+.1e} (standard error {error:.1e}), in frames {in_frames:+.1e}");
+        assert!(error < 1e-4 && beyond.abs() < 0.1 && exact.abs() < 5e-4 && in_frames.abs() < 2e-3, "{mesh} {light}");
+    }
+}
+
 /// Lobes about as narrow as the sun show its shape, which is that of its texels as they are looked up: as one point it is off by
 /// several percent.
 #[test]

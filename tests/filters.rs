@@ -151,7 +151,7 @@ fn maps_are_looked_up_at_the_level_of_their_texels_under_a_pixel() {
         let device = Options { device: Some(DEVICE.into()), validate: true };
         let config = Config { filter, lod_bias, ..config(EXTENT, Estimator::Mis, 2) };
         let settings = Settings { aovs: vec![Aov::Mip], device, ..Settings::new(config) };
-        let image = render(&scene, &settings, &mut |_, _| {}).unwrap().image;
+        let image = render(&scene, &settings, &mut |_, _, _| {}).unwrap().image;
         let covered = image.channel("mip.Y").unwrap().iter().zip(image.channel("A").unwrap()).filter(|(_, a)| **a == 1.0);
         let all: Vec<f32> = covered.map(|(mip, _)| *mip).collect();
         assert!(all.len() > 2000);

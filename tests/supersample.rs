@@ -27,7 +27,7 @@ fn supersampled(world: &World, extent: [u32; 2], estimator: Estimator, samples: 
     let device = Options { device: Some(DEVICE.into()), validate: true };
     let settings =
         Settings { supersample: Some(samples), seed, device, ..Settings::new(Config { estimator, ..Config::new(extent) }) };
-    let rendered = render(world, &settings, &mut |_, _| ()).unwrap();
+    let rendered = render(world, &settings, &mut |_, _, _| ()).unwrap();
     assert_eq!((rendered.image.width, rendered.image.height), (extent[0], extent[1]));
     assert_eq!(rendered.stats.validation_messages, [""; 0]);
     rendered
@@ -204,8 +204,8 @@ fn images_are_the_same_in_every_run_and_in_sequences() {
         frames.push(image);
         Ok(())
     };
-    let stats = render_frames(&mut still, &settings, 0..2, &mut |_, _| (), &mut keep).unwrap();
-    assert_eq!(render(still.world(), &settings, &mut |_, _| ()).unwrap().image, frames[0]);
+    let stats = render_frames(&mut still, &settings, 0..2, &mut |_, _, _| (), &mut keep).unwrap();
+    assert_eq!(render(still.world(), &settings, &mut |_, _, _| ()).unwrap().image, frames[0]);
     assert_ne!(frames[0], frames[1], "each frame has samples of its own");
     assert!(stats.noise.unwrap().rel_l2 > 0.0 && stats.frame_ms.median > 0.0);
 }
@@ -225,11 +225,11 @@ fn what_has_no_meaning_is_refused() {
         (Settings { supersample: Some(1), ..plain() }, "--samples: expected 2 to"),
     ];
     for (settings, expected) in cases {
-        let said = render(&scene, &settings, &mut |_, _| ()).map(|_| ()).unwrap_err();
+        let said = render(&scene, &settings, &mut |_, _, _| ()).map(|_| ()).unwrap_err();
         assert!(said.to_string().starts_with(expected) && said.exit_code() == 2, "{said}");
     }
     // Whatever filter there is beside it is not looked at.
     let filtered = of(Config { filter: Filter::Tk, geometric: true, ..base });
-    let image = |settings: &Settings| render(&scene, settings, &mut |_, _| ()).unwrap().image;
+    let image = |settings: &Settings| render(&scene, settings, &mut |_, _, _| ()).unwrap().image;
     assert_eq!(image(&filtered), image(&plain()));
 }

@@ -8,6 +8,7 @@ use crate::offline::error::Result;
 use crate::offline::headless::{Headless, Options};
 use crate::offline::image_io::LinearImage;
 use crate::offline::levels;
+use crate::offline::progress::Progress;
 use crate::offline::rates;
 use crate::offline::session::Session;
 use crate::offline::stats::{Pixels, Quantiles, Samples, Stats, pass_times};
@@ -17,6 +18,8 @@ use crate::{Config, Estimator, Rate, Requirements};
 use serde_json::json;
 use std::collections::BTreeMap;
 
+/// What progress tells of beside materials.
+pub(super) const FRAMES: &str = "frames";
 /// Frames before timing starts.
 pub(crate) const WARM_UP: u32 = 2;
 /// Frames that are timed.
@@ -104,19 +107,19 @@ pub struct Rendered {
     pub stats: Stats,
 }
 
-/// Renders `world`. `progress` is told how many of how many frames are done.
+/// Renders `world`. `progress` is told how many of how many materials are fitted, then of frames.
 ///
 /// # Errors
 /// [`crate::offline::error::Error`] of the settings, the device or the driver.
-pub fn render(world: &World, settings: &Settings, progress: &mut dyn FnMut(u32, u32)) -> Result<Rendered> {
-    let (mut session, config) = open(world, settings)?;
+pub fn render(world: &World, settings: &Settings, progress: &mut Progress<'_>) -> Result<Rendered> {
+    let (mut session, config) = open(world, settings, progress)?;
     settings.prepare(&mut session, world, &config)?;
     let chunks = settings.chunks(&config);
     let total = chunks + if settings.timed { WARM_UP + TIMED } else { 0 };
-    let mut done = 0;
+    let mut done = 0u32;
     let shot = image(&mut session, world, settings, &config, 0, &mut |_| {
         done += 1;
-        progress(done, total);
+        progress(FRAMES, u64::from(done), u64::from(total));
     })?;
 
     // A frame's times arrive when its slot is recorded again.
@@ -126,7 +129,7 @@ pub fn render(world: &World, settings: &Settings, progress: &mut dyn FnMut(u32, 
         if frame >= WARM_UP {
             timings.extend(session.timings().cloned());
         }
-        progress(chunks + frame + 1, total);
+        progress(FRAMES, u64::from(chunks + frame + 1), u64::from(total));
     }
     let counts = shot.counts(&mut session, settings, &config)?;
     let mut stats = report(world, settings, &config, &session, &timings, counts);
@@ -135,7 +138,7 @@ pub fn render(world: &World, settings: &Settings, progress: &mut dyn FnMut(u32, 
 }
 
 /// A session of `world` with these settings.
-pub(super) fn open(world: &World, settings: &Settings) -> Result<(Session, Config)> {
+pub(super) fn open(world: &World, settings: &Settings, progress: &mut Progress<'_>) -> Result<(Session, Config)> {
     let config = match settings.supersample {
         Some(samples) => settings.supersampled(world, samples)?,
         None => settings.config(),
@@ -143,8 +146,8 @@ pub(super) fn open(world: &World, settings: &Settings) -> Result<(Session, Confi
     config.validate()?;
     let headless = Headless::new(&settings.device, &Requirements::of(&config))?;
     let session = match settings.supersample {
-        Some(_) => Session::new(headless, &supersample::at_base(world), &config)?,
-        None => Session::new(headless, world, &config)?,
+        Some(_) => Session::opening(headless, &supersample::at_base(world), &config, progress)?,
+        None => Session::opening(headless, world, &config, progress)?,
     };
     Ok((session, config))
 }

@@ -4,7 +4,8 @@ use crate::offline::animation::AnimatedWorld;
 use crate::offline::bench::quality::Noise;
 use crate::offline::error::{Error, Result};
 use crate::offline::image_io::LinearImage;
-use crate::offline::render::{Settings, TIMED, WARM_UP, image, open, report};
+use crate::offline::progress::Progress;
+use crate::offline::render::{FRAMES, Settings, TIMED, WARM_UP, image, open, report};
 use crate::offline::stats::{Pixels, Stats};
 use serde_json::json;
 use std::collections::BTreeMap;
@@ -14,7 +15,7 @@ use std::time::Instant;
 /// Renders `frames` of `world` in order and hands each to `write`. A frame does not depend on those before it, except at
 /// [`crate::Rate::Luminance`], which looks at the one before. In the statistics, times are those of all frames (at least five, the
 /// last one being repeated) and counts the means over them; `setup_ms` holds the animation's work on the CPU and all uploads.
-/// `progress` is told how many of how many frames of the renderer are done.
+/// `progress` is told how many of how many materials are fitted, then of frames of the renderer.
 ///
 /// # Errors
 /// Of the range, the settings, the device or the driver, or what `write` returns.
@@ -22,7 +23,7 @@ pub fn render_frames(
     world: &mut AnimatedWorld,
     settings: &Settings,
     frames: Range<u32>,
-    progress: &mut dyn FnMut(u32, u32),
+    progress: &mut Progress<'_>,
     write: &mut dyn FnMut(u32, LinearImage) -> Result<()>,
 ) -> Result<Stats> {
     let most = world.frames().unwrap_or(u32::MAX);
@@ -37,7 +38,7 @@ pub fn render_frames(
         posing += clock.elapsed().as_secs_f64() * 1e3;
     };
     show(world, frames.start);
-    let (mut session, config) = open(world.world(), settings)?;
+    let (mut session, config) = open(world.world(), settings, progress)?;
     let drawn = (frames.end - frames.start).saturating_mul(settings.chunks(&config));
     let repeated = if settings.timed { 1 + TIMED.saturating_sub(drawn) } else { 0 };
     let warm_up = if settings.timed { WARM_UP } else { 0 };
@@ -56,7 +57,7 @@ pub fn render_frames(
                 // The seeds of what `luminance` is prepared with: it goes on as if these frames had not been.
                 session.frame([settings.seed, warm_up])?;
                 done += 1;
-                progress(done, total);
+                progress(FRAMES, u64::from(done), u64::from(total));
             }
         }
         let shot = image(&mut session, world.world(), settings, &config, number, &mut |session| {
@@ -65,7 +66,7 @@ pub fn render_frames(
                 times.extend(session.timings().cloned());
             }
             done += 1;
-            progress(done, total);
+            progress(FRAMES, u64::from(done), u64::from(total));
         })?;
         if settings.timed {
             counted.push(shot.counts(&mut session, settings, &config)?);
@@ -77,7 +78,7 @@ pub fn render_frames(
         session.frame([settings.seed, frames.end - 1])?;
         times.extend(session.timings().cloned());
         done += 1;
-        progress(done, total);
+        progress(FRAMES, u64::from(done), u64::from(total));
     }
     let mut stats = report(world.world(), settings, &config, &session, &times, mean(&counted));
     stats.noise = Noise::mean(&noise);

@@ -14,6 +14,7 @@ use crate::gpu::upload::{BufferUpload, ImageUpload};
 use crate::offline::error::{Error, Result};
 use crate::offline::headless::Headless;
 use crate::offline::mesh_buffers::MeshBuffers;
+use crate::offline::progress::Progress;
 pub use crate::offline::read_back::MomentLevels;
 use crate::offline::read_back::copy_buffer;
 use crate::offline::shown::Shown;
@@ -54,7 +55,15 @@ impl Session {
     ///
     /// # Errors
     /// The library's or the device's.
-    pub fn new(mut headless: Headless, world: &World, config: &Config) -> Result<Self> {
+    pub fn new(headless: Headless, world: &World, config: &Config) -> Result<Self> {
+        Self::opening(headless, world, config, &mut |_, _, _| ())
+    }
+
+    /// The same; `told` is told how many of how many materials are analysed and fitted, which takes seconds each.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn opening(mut headless: Headless, world: &World, config: &Config, told: &mut Progress<'_>) -> Result<Self> {
         let mut setup = SetupTimes::new();
         let clock = Instant::now();
         let mut renderer = {
@@ -72,21 +81,21 @@ impl Session {
             let analyse = |m: &mut crate::Material| {
                 m.lobe_bandwidth = Some(Arc::new(lobe_cache::lobe_bandwidth(&m.model, config.eps, folder.as_deref())));
             };
-            materials.iter_mut().for_each(analyse);
+            each_told("bandwidth of lobes", materials.iter_mut(), told, analyse);
         }
         if config.estimator.looks_up() {
             let folder = fit_cache::cache_folder();
             let fit = |m: &mut crate::Material| {
                 m.lobe_fit = Some(Arc::new(fit_cache::lobe_fit(&m.model, config.fit_budget(), folder.as_deref())));
             };
-            materials.iter_mut().filter(|m| m.keeps_model()).for_each(fit);
+            each_told("lobe fits", materials.iter_mut().filter(|m| m.keeps_model()), told, fit);
         }
         // Those of a level at a time are the device's.
         if config.filter.gaussians().is_some_and(|fit| fit.order != Order::Levels) {
             let clock = Instant::now();
             let folder = gaussians_cache::cache_folder();
             let fit = |m: &mut crate::Material| m.gaussians = gaussians_cache::gaussians(m, config.filter, folder.as_deref());
-            materials.iter_mut().for_each(fit);
+            each_told("mixtures", materials.iter_mut(), told, fit);
             setup.push(("mixtures", milliseconds(clock)));
         }
         // SAFETY: the command buffer is recording and submitted at once.
@@ -387,6 +396,16 @@ impl Drop for Session {
 fn of_maps(renderer: &Renderer) -> Result<SetupTimes> {
     let known = |name: &&str| [brdf_map::NAME, vmf_mips::NAME, cluster_moments::NAME, mixtures::NAME].contains(name);
     Ok(renderer.set_up_timings()?.unwrap_or_default().passes.into_iter().filter(|(name, _)| known(name)).collect())
+}
+
+/// Does something with each of `all` and tells of it.
+fn each_told<T>(what: &str, all: impl Iterator<Item = T>, told: &mut Progress<'_>, mut work: impl FnMut(T)) {
+    let all: Vec<T> = all.collect();
+    let total = all.len() as u64;
+    for (done, one) in (0..).zip(all) {
+        told(what, done, total);
+        work(one);
+    }
 }
 
 pub(super) fn closed() -> Error {

@@ -13,6 +13,7 @@ pub mod bake;
 pub mod bandwidth;
 pub mod blinn_phong;
 pub(crate) mod cavity;
+mod fine_grid;
 pub mod frame;
 pub mod ggx;
 pub mod half_row;

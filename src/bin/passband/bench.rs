@@ -1,8 +1,8 @@
 //! `passband bench`: variants of a frame measured side by side.
 
+use crate::progress::Bar;
 use crate::sheet;
 use clap::ValueEnum;
-use indicatif::{ProgressBar, ProgressStyle};
 use passband::Filter;
 use passband::offline::bench::figures::Figure;
 use passband::offline::bench::report::Report;
@@ -191,8 +191,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     for folder in args.plots.iter().chain(&args.figures) {
         std::fs::create_dir_all(folder).map_err(|e| Error::Write { path: folder.clone(), reason: e.to_string() })?;
     }
-    let style = ProgressStyle::with_template("{msg} {bar:30} {pos}/{len} {eta}").unwrap_or_else(|_| ProgressStyle::default_bar());
-    let bar = ProgressBar::new(1).with_style(style);
+    let bar = Bar::new();
     let mut drawn = Vec::new();
     let mut keep = |scene: &str, figure: Figure| {
         let Some(folder) = &args.figures else { return Ok(()) };
@@ -202,15 +201,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         Ok(())
     };
     let keep: Option<&mut suites::Keep<'_>> = if args.figures.is_some() { Some(&mut keep) } else { None };
-    let mut progress = |what: &str, done, total| {
-        if bar.message() != what {
-            // The time left is of each step alone.
-            bar.reset_eta();
-            bar.set_message(what.to_string());
-        }
-        bar.set_length(total);
-        bar.set_position(done);
-    };
+    let mut progress = |what: &str, done, total| bar.tell(what, done, total);
     // After every scene: hours of work are not lost with the last minute's.
     let written = |text: serde_json::Result<String>| {
         let Some(path) = &args.json else { return Ok(()) };
@@ -220,7 +211,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     match &order {
         Order::Rates(order) => {
             let report = suites::run(order, keep, &mut progress, &mut |report| written(serde_json::to_string_pretty(report)))?;
-            bar.finish_and_clear();
+            bar.clear();
             crate::print(table::text(&report))?;
             if let Some(folder) = &args.plots {
                 plots(folder, &report)?;
@@ -229,7 +220,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         }
         Order::Filters(order) => {
             let report = xu::run(order, keep, &mut progress, &mut |report| written(serde_json::to_string_pretty(report)))?;
-            bar.finish_and_clear();
+            bar.clear();
             crate::print(xu_table::text(&report))?;
             written(serde_json::to_string_pretty(&report))?;
         }

@@ -5,6 +5,7 @@ mod compare;
 mod environment;
 mod info;
 mod material;
+mod progress;
 mod render;
 mod scenes;
 mod sheet;

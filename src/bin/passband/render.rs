@@ -1,7 +1,7 @@
 //! `passband render`: a scene to an image file, or frames of an animation to numbered ones.
 
+use crate::progress::Bar;
 use clap::ValueEnum;
-use indicatif::{ProgressBar, ProgressStyle};
 use passband::distribution::effective::Rule;
 use passband::frequency::allocation::Allocation;
 use passband::frequency::operators::Combine;
@@ -295,12 +295,8 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let loading = clock.elapsed().as_secs_f64() * 1e3;
     let settings = args.settings(scene.config(args.size.or(world.world().size).unwrap_or(SIZE)))?;
 
-    let style = ProgressStyle::with_template("{msg} {bar:30} {pos}/{len} {eta}").unwrap_or_else(|_| ProgressStyle::default_bar());
-    let bar = ProgressBar::new(1).with_style(style).with_message("frames");
-    let mut progress = |done: u32, total: u32| {
-        bar.set_length(total.into());
-        bar.set_position(done.into());
-    };
+    let bar = Bar::new();
+    let mut progress = |what: &str, done, total| bar.tell(what, done, total);
     let mut stats = match args.frames.clone() {
         Some(frames) => {
             // One exposure for all, or the sequence would flicker.
@@ -317,7 +313,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
             rendered.stats
         }
     };
-    bar.finish_and_clear();
+    bar.clear();
     stats.setup_ms.insert("loading", loading);
     if let Some(path) = &args.stats {
         let text = serde_json::to_string_pretty(&stats).map_err(|e| Error::argument("--stats", "numbers", e))?;

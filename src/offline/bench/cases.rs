@@ -126,8 +126,8 @@ pub fn of_residual(quick: bool) -> Vec<(Half, Case)> {
 
 fn halves(tuning: &[Case], judged: &[Case], quick: bool) -> Vec<(Half, Case)> {
     let half = |half: Half, cases: &[Case]| cases.iter().map(|c| (half, *c)).collect::<Vec<_>>();
-    let mut cases = half(Half::Tuning, tuning);
-    cases.extend(half(Half::Judged, judged));
+    let mut cases = half(Half::Judged, judged);
+    cases.extend(half(Half::Tuning, tuning));
     cases.retain(|(_, c)| c.quick || !quick);
     cases
 }

@@ -96,7 +96,7 @@ impl Stage<'_> {
     }
 
     fn render(&self, config: Config, aovs: &[Aov], timed: bool) -> Result<Rendered> {
-        render(self.world, &Settings { config, aovs: aovs.to_vec(), timed, ..self.base.clone() }, &mut |_, _| ())
+        render(self.world, &Settings { config, aovs: aovs.to_vec(), timed, ..self.base.clone() }, &mut |_, _, _| ())
     }
 
     fn predicted(&self) -> Config {

@@ -12,7 +12,7 @@ use std::path::Path;
 /// The smallest error is to be ten times the noise of a reference; it is only estimated before, from two frames.
 const MARGIN: f64 = 12.0;
 /// Directions a pixel after which a reference is not refined further.
-const MOST_DIRECTIONS: u64 = 1 << 18;
+const MOST_DIRECTIONS: u64 = 1 << 16;
 /// An [agreement](ReferenceReport::agreement) above this is no chance: what the cache held is of another renderer.
 const MOST_DISAGREEMENT: f64 = 1.4;
 /// Estimators whose full rate is a ladder.

@@ -11,6 +11,7 @@ use crate::offline::bench::variants::{self, Family};
 use crate::offline::bench::{curves, judge, reached, table};
 use crate::offline::error::Result;
 use crate::offline::headless::Options;
+use crate::offline::progress::Progress;
 use crate::offline::render::Settings;
 use crate::offline::scene::Scene;
 use crate::offline::world::World;
@@ -116,8 +117,6 @@ impl Preset {
     }
 }
 
-/// One step of a run: what, and how much of it is done.
-pub type Progress<'a> = dyn FnMut(&str, u64, u64) + 'a;
 /// What becomes of figures: the scene's name and one of them.
 pub type Keep<'a> = dyn FnMut(&str, Figure) -> Result<()> + 'a;
 

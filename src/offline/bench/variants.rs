@@ -114,7 +114,8 @@ const fn further_residual(name: &'static str, change: fn(&mut Config)) -> Family
     Family { estimator: Estimator::Residual, ..further(name, change) }
 }
 
-/// All of `families`, in the place of what `base` says. `all` is for the full preset.
+/// All of `families`, in the place of what `base` says. `all` is for the full preset. Those of as many directions follow each other,
+/// the first one's before all: they are compared, and a machine that other work slows down does so for seconds.
 pub fn variants(families: &[Family], base: &Settings, all: bool) -> Vec<Variant> {
     let of = |family: &Family| {
         let more = if all { family.more } else { &[] };
@@ -127,7 +128,10 @@ pub fn variants(families: &[Family], base: &Settings, all: bool) -> Vec<Variant>
         };
         family.directions.iter().chain(more).map(variant).collect::<Vec<_>>()
     };
-    families.iter().flat_map(of).collect()
+    let mut variants: Vec<_> = families.iter().flat_map(of).collect();
+    let first = variants.first().map(|v| v.settings.config.directions);
+    variants.sort_by_key(|v| (Some(v.settings.config.directions) != first, v.settings.config.directions));
+    variants
 }
 
 #[cfg(test)]
