@@ -88,6 +88,9 @@ struct Subject {
     config: Config,
     /// Of every frame.
     record_ms: Vec<f64>,
+    /// The first round of which the image is kept.
+    kept_from: u32,
+    images: Vec<Frame>,
 }
 
 impl Subject {
@@ -96,7 +99,7 @@ impl Subject {
         config.validate()?;
         let mut session = Session::new(Headless::new(&variant.settings.device, &Requirements::of(&config))?, world, &config)?;
         variant.settings.prepare(&mut session, world, &config)?;
-        Ok(Self { session, config, record_ms: Vec::new() })
+        Ok(Self { session, config, record_ms: Vec::new(), kept_from: u32::MAX, images: Vec::new() })
     }
 }
 
@@ -112,8 +115,13 @@ impl Timed for Session {
 
 impl Timed for Subject {
     fn frame(&mut self, seed: [u32; 2]) -> Result<()> {
-        self.session.frame(seed)?;
+        // Images do not depend on how many rounds there are.
+        let kept = seed[1].checked_sub(self.kept_from);
+        self.session.frame(kept.map_or(seed, |image| [1, image]))?;
         self.record_ms.push(self.session.record_ms());
+        if kept.is_some() {
+            self.images.push(Frame::read(&mut self.session)?);
+        }
         Ok(())
     }
 
@@ -163,11 +171,12 @@ impl<'a> Runner<'a> {
         Ok(runner)
     }
 
-    /// Times `rounds` frames of each variant.
+    /// Times `rounds` frames of each variant, and keeps the images of the last `kept`, at most one more than these.
     ///
     /// # Errors
     /// The device's.
-    pub fn time(&mut self, rounds: u32, progress: &mut dyn FnMut(u64, u64)) -> Result<()> {
+    pub fn time(&mut self, rounds: u32, kept: u32, progress: &mut dyn FnMut(u64, u64)) -> Result<()> {
+        self.subjects.iter_mut().for_each(|subject| subject.kept_from = WARM_UP + rounds + 1 - kept);
         self.times = interleave(&mut self.subjects, rounds, progress)?;
         Ok(())
     }
@@ -186,24 +195,10 @@ impl<'a> Runner<'a> {
         .collect()
     }
 
-    /// `count` frames of each variant but the control, with seeds that no timed frame and no reference has.
-    ///
-    /// # Errors
-    /// The device's, on read-back.
-    pub fn frames(&mut self, count: u32, progress: &mut dyn FnMut(u64, u64)) -> Result<Vec<Vec<Frame>>> {
+    /// The images of the last frames of each variant but the control, as many as [`Self::time`] was told to keep.
+    pub fn images(&mut self) -> Vec<Vec<Frame>> {
         let variants = self.subjects.len().saturating_sub(1);
-        let total = variants as u64 * u64::from(count);
-        let mut done = 0;
-        let mut frames = |subject: &mut Subject| {
-            let all = (0..count).map(|frame| {
-                subject.frame([1, frame])?;
-                done += 1;
-                progress(done, total);
-                Frame::read(&mut subject.session)
-            });
-            all.collect()
-        };
-        self.subjects.iter_mut().take(variants).map(&mut frames).collect()
+        self.subjects.iter_mut().take(variants).map(|subject| std::mem::take(&mut subject.images)).collect()
     }
 }
 

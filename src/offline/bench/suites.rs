@@ -262,8 +262,9 @@ impl Run<'_, '_, '_> {
         let progress = &mut *self.progress;
         let mut told = |what: &str, done, total| progress(&format!("{}: {what}", world.name), done, total);
         let mut runner = Runner::new(world, variants, &mut |done, total| told("set-up", done, total))?;
-        runner.time(self.report.head.rounds, &mut |done, total| told("frames", done, total))?;
-        let frames = runner.frames(order.suite.error_frames(), &mut |done, total| told("images", done, total))?;
+        let kept = order.suite.error_frames();
+        runner.time(self.report.head.rounds, kept, &mut |done, total| told("frames", done, total))?;
+        let frames = runner.images();
         let measured = runner.measured()?;
         self.report.head.device = measured.first().map(|m| m.stats.device.clone());
         let first = measured.first().map(|m| m.times.clone()).unwrap_or_default();

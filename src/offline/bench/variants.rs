@@ -56,7 +56,7 @@ const HOPELESS: f32 = 1e6;
 /// Full rate with each estimator is the ladder on which gains are found; that of the one that needs more directions reaches further.
 pub const BAGHER: &[Family] = &[
     Family { directions: &[64, 4, 16, 256], ..FULL },
-    Family { name: "full brdf-random", estimator: Estimator::BrdfRandom, directions: &[64, 256], more: &[16, 1024], ..FULL },
+    Family { name: "full brdf-random", estimator: Estimator::BrdfRandom, directions: &[64, 256], more: &[16, 512], ..FULL },
     compared(HALF),
     compared(Family { name: "quarter", rate: Rate::Uniform(2), ..FULL }),
     compared(Family { name: "luminance", rate: Rate::Luminance, ..FULL }),
