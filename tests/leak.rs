@@ -65,7 +65,7 @@ fn whichever_request_fails_nothing_is_kept() {
         // SAFETY: the command buffer is recording.
         rig.try_submit(|cmd, _, memory| unsafe { renderer.record_materials(cmd, &models, memory) })
     });
-    assert_eq!(requests, 15, "four images and three buffers, each with staging, and the moments");
+    assert_eq!(requests, 16, "four images and three buffers, each with staging, the moments, and the table of their lengths");
 
     let draws = [rig.draw(&builtin::mesh("sphere", 16).unwrap(), 0)];
     let image = rig.frame(&mut renderer, &draws);
