@@ -75,7 +75,7 @@ void encode(vec3 mu, float spread, out vec4 first, out vec4 second) {
     }
 }
 
-const float LOG_MOST_TABULATED = 11.090370; // log(1 + 65536)
+const float LOG_MOST_TABULATED = 11.090370; // log(1 + MOST_TABULATED) of src/distribution/literal.rs
 
 // The spread of a lobe, from the table: even in the logarithm of 1 + kappa, linear between entries.
 float tabulated_spread(float kappa) {

@@ -1,9 +1,8 @@
 //! What a renderer is built for. Everything here is fixed until [`crate::Renderer::resize`] or a new renderer.
 
-use crate::distribution::effective::Rule;
 use crate::distribution::fit::MOST_LOBES;
 use crate::distribution::fitter::Budget;
-use crate::distribution::{Division, Filter};
+use crate::distribution::{Division, Filter, Rule};
 use crate::error::{Error, Result};
 use crate::frequency::allocation::Allocation;
 use crate::frequency::environment::EPS;

@@ -27,7 +27,7 @@ mod view;
 
 pub use ash;
 pub use config::{Bins, Config, Estimator, GBufferSource, Rate};
-pub use distribution::{Division, Filter};
+pub use distribution::{Division, Filter, Rule};
 pub use error::{Error, Result};
 pub use frame::{EnvironmentUse, FrameInputs, GBufferInput, Output};
 pub use glam;

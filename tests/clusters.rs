@@ -11,14 +11,13 @@ mod support {
 
 use chosen_device::DEVICE;
 use glam::DVec3;
-use passband::distribution::effective::Rule;
 use passband::moments::Moments;
 use passband::offline::builtin;
 use passband::offline::headless::{Headless, Options};
 use passband::offline::reference::Options as Quadrature;
 use passband::offline::session::Session;
 use passband::offline::world::World;
-use passband::{Config, Division, Estimator, Filter, Light, Maps, Requirements, Roughness};
+use passband::{Config, Division, Estimator, Filter, Light, Maps, Requirements, Roughness, Rule};
 use support::filters::{Minified, blinn_phong, lobes, normals, plane, roughness, scene};
 use support::frames::{Stage, config, expected_with, furthest, ggx, ratio, tiles, world};
 

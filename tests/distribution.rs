@@ -6,7 +6,7 @@ mod support {
 }
 
 use glam::{DMat3, DVec3};
-use passband::distribution::effective::Rule;
+use passband::Rule;
 use passband::distribution::mixture::Masking;
 use passband::distribution::vmf::Lobe;
 use passband::distribution::{BrdfMap, Cells, Filter, Filtered, Mixture};

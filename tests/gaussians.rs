@@ -12,7 +12,6 @@ mod support {
 use chosen_device::DEVICE;
 use glam::{DVec2, DVec3};
 use passband::distribution::alignment::{Fit, Order};
-use passband::distribution::effective::Rule;
 use passband::distribution::vmf::Lobe;
 use passband::distribution::{BrdfMap, Filtered, Gaussians, Mixture};
 use passband::moments::Moments;
@@ -21,7 +20,7 @@ use passband::offline::headless::{Headless, Options};
 use passband::offline::reference::Options as Quadrature;
 use passband::offline::session::Session;
 use passband::sampling::sobol;
-use passband::{Config, Division, Estimator, Filter, Light, Maps, Requirements, Roughness};
+use passband::{Config, Division, Estimator, Filter, Light, Maps, Requirements, Roughness, Rule};
 use std::time::Instant;
 use support::brdf_maps::builtin;
 use support::filters::{Minified, blinn_phong, lobes, normals, plane, roughness, scene};

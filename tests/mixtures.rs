@@ -11,13 +11,12 @@ mod support {
 
 use chosen_device::DEVICE;
 use glam::DVec3;
-use passband::distribution::effective::Rule;
 use passband::moments::Moments;
 use passband::offline::builtin as scenes;
 use passband::offline::headless::{Headless, Options};
 use passband::offline::session::Session;
 use passband::offline::world::World;
-use passband::{Config, Division, Estimator, Filter, Maps, Requirements, Roughness};
+use passband::{Config, Division, Estimator, Filter, Maps, Requirements, Roughness, Rule};
 use std::time::Instant;
 use support::brdf_maps::material;
 use support::filters::{blinn_phong, lobes, normals, roughness};

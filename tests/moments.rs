@@ -12,7 +12,6 @@ mod support {
 use chosen_device::DEVICE;
 use glam::{DVec3, Vec3};
 use passband::distribution::Filtered;
-use passband::distribution::effective::Rule;
 use passband::moments::Moments;
 use passband::offline::builtin;
 use passband::offline::headless::{Headless, Options};
@@ -20,7 +19,7 @@ use passband::offline::reference::Options as Quadrature;
 use passband::offline::session::{MomentLevels, Session};
 use passband::offline::world::World;
 use passband::reflectance::Model;
-use passband::{Config, Division, Estimator, Filter, Light, Maps, Requirements, Roughness, Sampling, Texture};
+use passband::{Config, Division, Estimator, Filter, Light, Maps, Requirements, Roughness, Rule, Sampling, Texture};
 use std::sync::Arc;
 use support::filters::{Minified, blinn_phong, lobes, normals, plane, roughness, scene, texels};
 use support::frames::{Stage, config, expected_with, furthest, ggx, ratio, table, tiles, world};

@@ -36,6 +36,7 @@ pub mod vmf;
 
 pub use brdf_map::BrdfMap;
 pub use clusters::Clusters;
+pub use effective::Rule;
 pub use filter::{Division, Filter, MOST_BASE_LOBES};
 pub use filtered::Filtered;
 pub use fit::LobeFit;

@@ -2,7 +2,6 @@
 
 use crate::offline::error::{Error, Result};
 use crate::offline::session::Session;
-use crate::offline::world::World;
 use crate::offline::{decision, footprint, levels};
 use crate::{Config, Estimator};
 
@@ -137,11 +136,11 @@ impl Aov {
         matches!(self, Self::Uv | Self::Footprint | Self::Mip)
     }
 
-    /// The layer's channels after a frame of `config` that shows `world`.
+    /// The layer's channels after a frame of `config`.
     ///
     /// # Errors
     /// The device's, on read-back.
-    pub fn read(self, session: &mut Session, world: &World, config: &Config) -> Result<Vec<Channel>> {
+    pub fn read(self, session: &mut Session, config: &Config) -> Result<Vec<Channel>> {
         let side = config.samples_per_side;
         let name = ALL.iter().find(|(_, a)| *a == self).map_or("", |(n, _)| n);
         let covered = Pixels::read(session, "ids", side)?;
@@ -230,7 +229,7 @@ impl Aov {
                 scalar(counts.iter().zip(mask).map(|(count, mask)| count * mask).collect())
             }
             Self::Mip => {
-                let mips = footprint::mips(session, world, config)?.into_iter().map(f32::to_bits).collect();
+                let mips = footprint::mips(session, config)?.into_iter().map(f32::to_bits).collect();
                 scalar(covered.of(mips).map(|t| f32::from_bits(t[0])))
             }
             Self::Shaded | Self::Samples => {

@@ -5,7 +5,6 @@ use crate::material::{Material, Reach, Sampling};
 use crate::moments::Base;
 use crate::offline::error::Result;
 use crate::offline::session::Session;
-use crate::offline::world::World;
 use glam::DVec2;
 
 /// For each sample of the last frame, row by row, the level of mips at which the finest of its material's maps is looked up, 0 for its
@@ -14,18 +13,16 @@ use glam::DVec2;
 ///
 /// # Errors
 /// The device's, on read-back.
-pub fn mips(session: &mut Session, world: &World, config: &Config) -> Result<Vec<f32>> {
+pub fn mips(session: &mut Session, config: &Config) -> Result<Vec<f32>> {
     let (ids, ..) = session.image("ids")?;
     let (derivatives, ..) = session.image("derivative")?;
     let ids: Vec<u32> = bytemuck::pod_collect_to_vec(&ids);
     let derivatives: Vec<[f32; 4]> = bytemuck::pod_collect_to_vec(&derivatives);
     let sampling = Sampling { anisotropy: config.anisotropy, lod_bias: config.lod_bias.into() };
-    let materials: Vec<_> = world.materials.iter().map(|material| material.surface()).collect();
-    let sizes: Vec<_> = materials.iter().map(|material| sizes(material, config)).collect();
+    let maps: Vec<_> = session.materials.iter().map(|material| (material.maps.tiling, sizes(material, config))).collect();
     let level = |(id, derivative): (&u32, &[f32; 4])| {
-        let Some(material) = id.checked_sub(1).map(|id| id as usize & 0xffff) else { return 0.0 };
-        let (Some(maps), Some(sizes)) = (materials.get(material).map(|m| &m.maps), sizes.get(material)) else { return 0.0 };
-        let tiling = DVec2::from(maps.tiling.map(f64::from));
+        let Some((tiling, sizes)) = id.checked_sub(1).and_then(|id| maps.get(id as usize & 0xffff)) else { return 0.0 };
+        let tiling = DVec2::from(tiling.map(f64::from));
         let [ux, vx, uy, vy] = derivative.map(f64::from);
         let footprint = [DVec2::new(ux, vx) * tiling, DVec2::new(uy, vy) * tiling];
         sizes.iter().map(|size| Reach::of(footprint, *size, sampling).lod).fold(0.0, f64::max) as f32

@@ -22,6 +22,7 @@ pub mod mesh;
 mod mesh_buffers;
 pub mod metrics;
 mod model_key;
+mod prepared;
 pub mod progress;
 pub mod rates;
 mod read_back;

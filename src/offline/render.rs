@@ -117,7 +117,7 @@ pub fn render(world: &World, settings: &Settings, progress: &mut Progress<'_>) -
     let chunks = settings.chunks(&config);
     let total = chunks + if settings.timed { WARM_UP + TIMED } else { 0 };
     let mut done = 0u32;
-    let shot = image(&mut session, world, settings, &config, 0, &mut |_| {
+    let shot = image(&mut session, settings, &config, 0, &mut |_| {
         done += 1;
         progress(FRAMES, u64::from(done), u64::from(total));
     })?;
@@ -173,11 +173,10 @@ impl Shot {
     }
 }
 
-/// What the session shows of `world`, as frame `number`, with its layers. `each` is called after every frame of the renderer, of which a
+/// What the session shows, as frame `number`, with its layers. `each` is called after every frame of the renderer, of which a
 /// reference and a supersampled image have several.
 pub(super) fn image(
     session: &mut Session,
-    world: &World,
     settings: &Settings,
     config: &Config,
     number: u32,
@@ -201,7 +200,7 @@ pub(super) fn image(
     let [width, height] = config.extent;
     let mut channels: Vec<_> = ["R", "G", "B", "A"].iter().enumerate().map(|(c, n)| (n.to_string(), channel(c))).collect();
     for aov in &settings.aovs {
-        channels.extend(aov.read(session, world, config)?);
+        channels.extend(aov.read(session, config)?);
     }
     Ok(Shot { image: LinearImage { width, height, channels }, noise: None, coverage: None })
 }

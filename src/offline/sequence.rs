@@ -60,7 +60,7 @@ pub fn render_frames(
                 progress(FRAMES, u64::from(done), u64::from(total));
             }
         }
-        let shot = image(&mut session, world.world(), settings, &config, number, &mut |session| {
+        let shot = image(&mut session, settings, &config, number, &mut |session| {
             // A frame's times arrive with the next one: the first brings the warm-up's.
             if done > warm_up {
                 times.extend(session.timings().cloned());

@@ -1,6 +1,5 @@
 //! A world on a device: uploaded once, rendered frame by frame, read back.
 
-use crate::distribution::alignment::Order;
 use crate::distribution::{LobeFit, chart};
 use crate::gpu::access::Access;
 use crate::gpu::buffer::Buffer;
@@ -14,19 +13,19 @@ use crate::gpu::upload::{BufferUpload, ImageUpload};
 use crate::offline::error::{Error, Result};
 use crate::offline::headless::Headless;
 use crate::offline::mesh_buffers::MeshBuffers;
+use crate::offline::prepared::Prepared;
 use crate::offline::progress::Progress;
 pub use crate::offline::read_back::MomentLevels;
 use crate::offline::read_back::copy_buffer;
 use crate::offline::shown::Shown;
 use crate::offline::window::{Window, near};
 use crate::offline::world::World;
-use crate::offline::{fit_cache, gaussians_cache, lobe_cache};
 use crate::pass::probe::Probe;
 use crate::pass::{PassContext, brdf_map, cluster_moments, mixtures, vmf_mips};
 use crate::plan::Levels;
 use crate::renderer::Renderer;
 use crate::sampling::LatLong;
-use crate::{Config, View};
+use crate::{Config, Material, View};
 use ash::vk;
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -42,6 +41,8 @@ pub type SetupTimes = Vec<(&'static str, f64)>;
 pub struct Session {
     pub(super) headless: Headless,
     pub(super) renderer: Option<Renderer>,
+    /// Those that the renderer has.
+    pub(super) materials: Vec<Material>,
     /// By the address of the mesh.
     meshes: HashMap<usize, MeshBuffers>,
     shown: Shown,
@@ -75,37 +76,15 @@ impl Session {
 
         let clock = Instant::now();
         let others = headless.live_bytes();
-        let mut materials: Vec<_> = world.materials.iter().map(|m| m.surface()).collect();
-        if config.predicts() {
-            let folder = lobe_cache::cache_folder();
-            let analyse = |m: &mut crate::Material| {
-                m.lobe_bandwidth = Some(Arc::new(lobe_cache::lobe_bandwidth(&m.model, config.eps, folder.as_deref())));
-            };
-            each_told("bandwidth of lobes", materials.iter_mut(), told, analyse);
-        }
-        if config.estimator.looks_up() {
-            let folder = fit_cache::cache_folder();
-            let fit = |m: &mut crate::Material| {
-                m.lobe_fit = Some(Arc::new(fit_cache::lobe_fit(&m.model, config.fit_budget(), folder.as_deref())));
-            };
-            each_told("lobe fits", materials.iter_mut().filter(|m| m.keeps_model()), told, fit);
-        }
-        // Those of a level at a time are the device's.
-        if config.filter.gaussians().is_some_and(|fit| fit.order != Order::Levels) {
-            let clock = Instant::now();
-            let folder = gaussians_cache::cache_folder();
-            let fit = |m: &mut crate::Material| m.gaussians = gaussians_cache::gaussians(m, config.filter, folder.as_deref());
-            each_told("mixtures", materials.iter_mut(), told, fit);
-            setup.push(("mixtures", milliseconds(clock)));
-        }
+        let Prepared { materials, mixtures_ms } = Prepared::new(world, config, told);
         // SAFETY: the command buffer is recording and submitted at once.
         headless.submit(|cmd, memory| Ok(unsafe { renderer.record_materials(cmd, &materials, memory) }?))?;
         // Beside the work on the processor, with which the rest of it is told.
         let on_device = of_maps(&renderer)?;
         let material_bytes = headless.live_bytes().saturating_sub(others + renderer.fit_bytes());
-        let others: f64 = on_device.iter().map(|(_, time)| time).sum();
-        let others = others + setup.iter().find(|(name, _)| *name == "mixtures").map_or(0.0, |(_, time)| *time);
+        let others = on_device.iter().map(|(_, time)| time).sum::<f64>() + mixtures_ms.unwrap_or_default();
         setup.push((crate::pass::materials::NAME, milliseconds(clock) - others));
+        setup.extend(mixtures_ms.map(|ms| (mixtures::NAME, ms)));
         setup.extend(on_device);
 
         let clock = Instant::now();
@@ -118,7 +97,7 @@ impl Session {
         let clock = Instant::now();
         let shown = Shown::of(world, config.extent);
         let (meshes, record_ms) = (HashMap::new(), 0.0);
-        let mut session = Self { headless, renderer: Some(renderer), meshes, shown, setup, material_bytes, record_ms };
+        let mut session = Self { headless, renderer: Some(renderer), materials, meshes, shown, setup, material_bytes, record_ms };
         session.upload_objects(world, &mut HashMap::new())?;
         session.reserve_cells(world)?;
         session.setup.push((MESHES, milliseconds(clock)));
@@ -176,9 +155,10 @@ impl Session {
     /// The library's or the device's.
     pub fn renew_materials(&mut self, world: &World) -> Result<SetupTimes> {
         let renderer = self.renderer.as_mut().ok_or_else(closed)?;
-        let materials: Vec<_> = world.materials.iter().map(|m| m.surface()).collect();
+        let Prepared { materials, .. } = Prepared::new(world, renderer.config(), &mut |_, _, _| ());
         // SAFETY: every submission is waited for; the command buffer is recording and submitted at once.
         self.headless.submit(|cmd, memory| Ok(unsafe { renderer.record_materials(cmd, &materials, memory) }?))?;
+        self.materials = materials;
         of_maps(renderer)
     }
 
@@ -396,16 +376,6 @@ impl Drop for Session {
 fn of_maps(renderer: &Renderer) -> Result<SetupTimes> {
     let known = |name: &&str| [brdf_map::NAME, vmf_mips::NAME, cluster_moments::NAME, mixtures::NAME].contains(name);
     Ok(renderer.set_up_timings()?.unwrap_or_default().passes.into_iter().filter(|(name, _)| known(name)).collect())
-}
-
-/// Does something with each of `all` and tells of it.
-fn each_told<T>(what: &str, all: impl Iterator<Item = T>, told: &mut Progress<'_>, mut work: impl FnMut(T)) {
-    let all: Vec<T> = all.collect();
-    let total = all.len() as u64;
-    for (done, one) in (0..).zip(all) {
-        told(what, done, total);
-        work(one);
-    }
 }
 
 pub(super) fn closed() -> Error {

@@ -264,8 +264,8 @@ impl BrdfMap {
             let views = classes[class].level_views(build)?;
             for (source, layers) in &group.sources {
                 let read = |place: Option<Place>| Resource::Sampled(classes[place.map_or(0, |p| p.0)], samplers.nearest);
-                let images = [read(source.normal), read(source.roughness), Resource::Storage(views[0])];
-                let resources: Vec<_> = images.into_iter().chain([Resource::Buffer(&spreads)]).collect();
+                let [normal, roughness] = [source.normal, source.roughness].map(read);
+                let resources = [normal, roughness, Resource::Storage(views[0]), Resource::Buffer(&spreads)];
                 write_set(&build.cx.device, sets.sets[pushes.len()], &resources);
                 pushes.push((class, Push::of(source, layers)));
             }

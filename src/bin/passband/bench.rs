@@ -160,6 +160,15 @@ impl Args {
     }
 }
 
+impl Args {
+    /// Keeps what was found so far, if that is asked for.
+    fn write(&self, report: &impl serde::Serialize) -> Result<()> {
+        let Some(path) = &self.json else { return Ok(()) };
+        let text = serde_json::to_string_pretty(report).map_err(|e| Error::argument("--json", "numbers", e))?;
+        write_atomically(path, |file| file.write_all(text.as_bytes()))
+    }
+}
+
 /// A filter by its name.
 fn filter(name: &str) -> std::result::Result<Filter, String> {
     let names = || Filter::ALL.map(Filter::name).join(", ");
@@ -202,27 +211,19 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     };
     let keep: Option<&mut suites::Keep<'_>> = if args.figures.is_some() { Some(&mut keep) } else { None };
     let mut progress = |what: &str, done, total| bar.tell(what, done, total);
-    // After every scene: hours of work are not lost with the last minute's.
-    let written = |text: serde_json::Result<String>| {
-        let Some(path) = &args.json else { return Ok(()) };
-        let text = text.map_err(|e| Error::argument("--json", "numbers", e))?;
-        write_atomically(path, |file| file.write_all(text.as_bytes()))
-    };
     match &order {
         Order::Rates(order) => {
-            let report = suites::run(order, keep, &mut progress, &mut |report| written(serde_json::to_string_pretty(report)))?;
+            let report = suites::run(order, keep, &mut progress, &mut |report| args.write(report))?;
             bar.clear();
             crate::print(table::text(&report))?;
             if let Some(folder) = &args.plots {
                 plots(folder, &report)?;
             }
-            written(serde_json::to_string_pretty(&report))?;
         }
         Order::Filters(order) => {
-            let report = xu::run(order, keep, &mut progress, &mut |report| written(serde_json::to_string_pretty(report)))?;
+            let report = xu::run(order, keep, &mut progress, &mut |report| args.write(report))?;
             bar.clear();
             crate::print(xu_table::text(&report))?;
-            written(serde_json::to_string_pretty(&report))?;
         }
     }
     drawn.iter().try_for_each(|path| crate::print(format_args!("figure: {}", path.display())))?;

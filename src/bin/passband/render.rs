@@ -2,7 +2,6 @@
 
 use crate::progress::Bar;
 use clap::ValueEnum;
-use passband::distribution::effective::Rule;
 use passband::frequency::allocation::Allocation;
 use passband::frequency::operators::Combine;
 use passband::offline::error::{Error, Result};
@@ -14,7 +13,7 @@ use passband::offline::scene::{MAX_FRAMES, Scene};
 use passband::offline::sequence::render_frames;
 use passband::offline::supersample::DEFAULT_SAMPLES;
 use passband::sampling::luminance;
-use passband::{Config, Division, Estimator, Filter};
+use passband::{Config, Division, Estimator, Filter, Rule};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -236,12 +235,9 @@ impl Args {
         let name = if supersample { Filter::Point.name() } else { &self.filter };
         let filter = Filter::ALL.into_iter().find(|filter| filter.name() == name);
         let filter = filter.ok_or_else(|| Error::NotSupportedYet { what: format!("--filter {}", self.filter) })?;
-        let literal = |form| self.literal.contains(&form);
-        let lobe_rule = match () {
-            () if literal(Literal::XuTable) => Rule::Tabulated,
-            () if literal(Literal::Xu) => Rule::Literal,
-            () => Rule::Exact,
-        };
+        let literal = |form: Literal| self.literal.contains(&form);
+        let forms = [(Literal::XuTable, Rule::Tabulated), (Literal::Xu, Rule::Literal)];
+        let lobe_rule = forms.into_iter().find(|(form, _)| literal(*form)).map_or(Rule::Exact, |(_, rule)| rule);
         let config = Config {
             rate,
             probes: self.probes.unwrap_or(base.probes),

@@ -121,7 +121,7 @@ impl Preset {
 pub type Keep<'a> = dyn FnMut(&str, Figure) -> Result<()> + 'a;
 
 /// Runs a suite. `keep` is given the figures of scenes that are named in the order, and of those of the quick preset; without,
-/// none are drawn. `found` is given the report so far after each scene, so that an interruption costs no more than one.
+/// none are drawn. `found` is given the report so far after each scene, so that an interruption costs no more than one, and the whole at the end.
 ///
 /// # Errors
 /// Of the scenes, the device or the driver, of `keep` and of `found`.
@@ -160,7 +160,8 @@ pub fn run(
             }
         }
     }
-    report.head.complete = true;
+    run.report.head.complete = true;
+    run.tell()?;
     Ok(report)
 }
 
@@ -221,12 +222,11 @@ impl Run<'_, '_, '_> {
             }
         }
         self.report.scenes.push(found);
-        self.conclude();
-        (self.found)(self.report)
+        self.tell()
     }
 
-    /// What follows from the scenes so far.
-    fn conclude(&mut self) {
+    /// Of the scenes so far, with what follows from them.
+    fn tell(&mut self) -> Result<()> {
         let report = &mut *self.report;
         report.summary = gains(&report.scenes);
         match self.order.suite {
@@ -241,6 +241,7 @@ impl Run<'_, '_, '_> {
             }
         }
         report.seconds.total = self.clock.elapsed().as_secs_f64();
+        (self.found)(report)
     }
 
     /// What `map` costs pre-convolved in every frame, and at half of its size; nothing for a size that is known.

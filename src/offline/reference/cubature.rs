@@ -1,7 +1,6 @@
 //! Direct light at one point by globally adaptive quadrature.
 
-use crate::distribution::effective::Rule;
-use crate::distribution::{Division, Filter};
+use crate::distribution::{Division, Filter, Rule};
 use crate::material::Sampling;
 use crate::offline::reference::environment::{Parts, Region, Tree};
 use crate::reflectance::Reflectance;

@@ -113,7 +113,7 @@ pub fn cache_folder() -> Option<PathBuf> {
 const MARGIN: f64 = 10.0;
 
 /// Runs the suite. `keep` is given a strip of images of each scene and light; without, none are drawn. `found` is given the
-/// report so far after each scene and light.
+/// report so far after each scene and light, and the whole at the end.
 ///
 /// # Errors
 /// Of the scenes, the device or the driver, of `keep` and of `found`. What a filter refuses is an empty row.
@@ -167,6 +167,7 @@ pub fn run(
         }
     }
     report.head.complete = true;
+    found(&report)?;
     Ok(report)
 }
 

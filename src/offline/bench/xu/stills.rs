@@ -9,7 +9,6 @@ use crate::offline::bench::xu::{Stage, finite, open};
 use crate::offline::error::Result;
 use crate::offline::metrics::Picture;
 use crate::offline::session::Session;
-use crate::offline::world::World;
 use crate::{Config, Estimator, Filter};
 
 /// Directions of one frame under an environment; frames are added until their noise is low.
@@ -53,7 +52,7 @@ pub(super) fn take(
         match open(&stage.world, &config, stage.device())? {
             Ok(mut session) => {
                 let (picture, frames, noise) = average(stage, filter, &mut session, (&reference.0, &reference.1))?;
-                row.lobes = lobes(&mut session, &stage.world, &config)?;
+                row.lobes = lobes(&mut session, &config)?;
                 let preconvolved = match stage.light {
                     Light::Point => None,
                     Light::Environment => preconvolved(stage, &config)?,
@@ -120,11 +119,11 @@ fn preconvolved(stage: &Stage<'_>, config: &Config) -> Result<Option<Picture>> {
 }
 
 /// Lobes of the session's last frame, a covered pixel.
-fn lobes(session: &mut Session, world: &World, config: &Config) -> Result<Option<f64>> {
+fn lobes(session: &mut Session, config: &Config) -> Result<Option<f64>> {
     if !config.filter.stores() {
         return Ok(None);
     }
-    let Some((_, values)) = Aov::Lobes.read(session, world, config)?.into_iter().next() else { return Ok(None) };
+    let Some((_, values)) = Aov::Lobes.read(session, config)?.into_iter().next() else { return Ok(None) };
     let covered = Frame::read(session)?.coverage;
     let each: Vec<f64> = values.iter().zip(covered).filter(|(_, a)| *a > 0.0).map(|(v, _)| f64::from(*v)).collect();
     Ok((!each.is_empty()).then(|| each.iter().sum::<f64>() / each.len() as f64))
