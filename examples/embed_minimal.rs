@@ -130,6 +130,7 @@ pub fn run(options: &Options) -> Result<Report, Box<dyn Error>> {
                 gbuffer: GBufferInput::Host { set: targets.set, images: &targets.gbuffer() },
                 environment: EnvironmentUse::default(),
                 lights: &[],
+                shadows: None,
                 levels: None,
                 seed: [0, 0],
                 output: Some(Output { image: output, transfer: Transfer::Srgb { exposure: 0.5 } }),

@@ -12,6 +12,8 @@ layout(constant_id = 2) const bool KERNEL = false;
 #include "local.glsl"
 #include "environment.glsl"
 #include "lights.glsl"
+#define SHADOWS_BINDING 13
+#include "shadows.glsl"
 #include "curvature.glsl"
 #include "bandwidth.glsl"
 #include "lobe_bandwidth.glsl"
@@ -147,7 +149,7 @@ int predict(uint entry) {
         wi = above ? wi : vec3(0.0, 0.0, 1.0);
         vec3 h = normalize(wi + f.view);
         float solid = exact ? w.w : 1.0 / max(light_density(lights[i], point, w.xyz), 1e-6);
-        float radiance = luminance(lights[i].power.rgb) * solid;
+        float radiance = luminance(shadowed(lights[i], at)) * solid;
         bool distant = exact && lights[i].place.w == LIGHT_DIRECTIONAL;
         float nearness = distant ? 0.0 : 1.0 / max(length(lights[i].place.xyz - point), 1e-6);
         float reflected = luminance(material_evaluate(m, wi, f.view, h)) * wi.z;
@@ -180,7 +182,8 @@ int predict(uint entry) {
         if (all(lessThan(p, extent))) {
             // Another object in the block is shaded once a pixel, or as finely as its edges need.
             bool same = !gbuffer_covered(p) || gbuffer_object(p) == c.object;
-            imageStore(level, p, uvec4(same ? found : min(found, findMSB(push.side) - 1)));
+            uint finest = uint(same ? found : min(found, findMSB(push.side) - 1));
+            imageStore(level, p, uvec4(LOCAL_LIGHTS ? shadow_level(p, finest) : finest));
         }
     }
     return found;

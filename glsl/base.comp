@@ -10,18 +10,22 @@ layout(constant_id = 15) const uint KINDS = 31u;
 #define PREFILTER_BINDING 5
 #define LOBES_BINDING 9
 #define FIT_BINDING 10
+#define SHADOWS_BINDING 11
 #include "frame.glsl"
 #include "gbuffer.glsl"
 #include "materials.glsl"
 #include "local.glsl"
 #include "lobes.glsl"
 #include "lights.glsl"
+#include "shadows.glsl"
 #include "prefilter.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
 
 // Whether the frame has lights beside the environment.
 layout(constant_id = 1) const bool LOCAL_LIGHTS = false;
+// Whether the environment may have suns.
+layout(constant_id = 2) const bool SUNS = true;
 
 // Where the filter finds lobes: whether there are materials beside, which stay as they are.
 layout(constant_id = 10) const uint UNFILTERED = 1u;
@@ -58,9 +62,11 @@ void main() {
         sharpest = max(sharpest, lobe.kappa);
         sum += lobe.weight * prefiltered(to_world(f, lobe.direction), EXACT != 0u ? min(lobe.kappa, prefiltered_most()) : lobe.kappa);
     }
-    sum += reflected_suns(f, m, l, a, sharpest);
+    if (SUNS) {
+        sum += reflected_suns(f, m, l, a, sharpest);
+    }
     if (LOCAL_LIGHTS) {
-        sum += reflected_lights(f, m, l, frame.eye.xyz + ray * gbuffer_depth(p));
+        sum += reflected_lights(f, m, l, frame.eye.xyz + ray * gbuffer_depth(p), p);
     }
     imageStore(radiance, p, vec4(sum, 1.0));
 }

@@ -7,6 +7,9 @@
 #include "local.glsl"
 #define FIT_BINDING 2
 #include "fit.glsl"
+#include "lights.glsl"
+#define SHADOWS_BINDING 4
+#include "shadows.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
 
@@ -31,5 +34,5 @@ void main() {
     Fit fit = fit_load(m, f.view.z);
     float error = fit.count > 0u ? fit.error : 1.0;
     uint found = error <= push.errors.x ? push.coarsest : (error <= push.errors.y ? push.half_rate : push.finest);
-    imageStore(level, p, uvec4(found));
+    imageStore(level, p, uvec4(shadow_level(p, found)));
 }

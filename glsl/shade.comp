@@ -8,12 +8,14 @@ layout(constant_id = 3) const bool KERNEL = false;
 #define MATERIAL_KERNEL KERNEL
 #define LOBES_BINDING 10
 #define FIT_BINDING 11
+#define SHADOWS_BINDING 14
 #include "frame.glsl"
 #include "gbuffer.glsl"
 #include "materials.glsl"
 #include "local.glsl"
 #include "environment.glsl"
 #include "lights.glsl"
+#include "shadows.glsl"
 #include "sobol.glsl"
 #include "lobes.glsl"
 #include "list.glsl"
@@ -81,6 +83,7 @@ layout(push_constant) uniform Push {
 } push;
 
 // This sample's.
+ivec2 place;
 uint brdf_samples, environment_samples, light_samples;
 
 // What a sample `finer` levels below a pixel's gets of the pixel's directions (src/plan.rs, Directions::at).
@@ -188,7 +191,7 @@ Contribution brdf_contribution(Surface s, vec3 p, uvec2 u) {
     for (uint i = 0u; LOCAL_LIGHTS && i < frame.lights.y; ++i) {
         float density = light_density(lights[frame.lights.x + i], p, w);
         float competing = alone ? 0.0 : float(light_samples) * density;
-        sum.lights += density > 0.0 ? value.rgb * lights[frame.lights.x + i].power.rgb * (weight / (brdf + competing)) : vec3(0.0);
+        sum.lights += density > 0.0 ? value.rgb * shadowed(lights[frame.lights.x + i], place) * (weight / (brdf + competing)) : vec3(0.0);
     }
     return sum;
 }
@@ -220,7 +223,7 @@ vec3 light_contribution(Surface s, vec3 p, LightRecord light, uvec2 u) {
         return vec3(0.0);
     }
     vec4 value = reflected(s, wi, normalize(wi + f.view));
-    return value.rgb * light.power.rgb / (float(brdf_samples) * value.a + float(light_samples) * density);
+    return value.rgb * shadowed(light, place) / (float(brdf_samples) * value.a + float(light_samples) * density);
 }
 
 // Reflectance and radiance in an arbitrary direction: no estimate, but the look-ups that every estimate is made of.
@@ -297,6 +300,7 @@ void main() {
     }
     ivec2 p = LEVELLED ? list_sample(entry) : ivec2(entry & 0xffffu, entry >> 16);
     int l = LEVELLED ? list_level(entry) : 0;
+    place = p;
     uint before = 0u;
     ivec2 whose = p;
     if (SHARING != 0) {
@@ -362,13 +366,13 @@ void main() {
     sum = t.sum.whole - t.sum.looked_up + t.sum.lights;
     if (ESTIMATOR != ESTIMATOR_RESIDUAL) {
         if (LOCAL_LIGHTS) {
-            sum += reflected_lights(f, m, s.lobes, at);
+            sum += reflected_lights(f, m, s.lobes, at, p);
         }
     }
     if (RATIO != 0u) {
         vec3 direct = reflected_suns(f, m, s.lobes, a, approximating_sharpest);
         if (LOCAL_LIGHTS) {
-            direct += reflected_lights(f, m, s.lobes, at);
+            direct += reflected_lights(f, m, s.lobes, at, p);
         }
         sum = lacking(t, max(known - direct, 0.0), min(approximation_error(a), 1.0)) + t.sum.lights;
         known += push.offset;

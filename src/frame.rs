@@ -33,6 +33,21 @@ pub struct Output {
     pub transfer: tonemap::Transfer,
 }
 
+/// How much of each light beside the environment arrives at each pixel, as the host found it: shadows. Where a mask changes, levels of
+/// predicted rates are fine enough to show it.
+#[derive(Clone, Copy)]
+pub struct ShadowMasks {
+    /// An image of one of [`SHADOW_FORMATS`] and of the output's or of the samples' extent, whose view is a 2-D array of one level; sampled
+    /// between its entry and exit. Its first channel is a factor on the light.
+    pub image: ImageRef,
+    /// Layers of the view: that of number i is of [`FrameInputs::lights`]`[i]`. Lights beyond them are unshadowed.
+    pub layers: u32,
+}
+
+/// Formats that [`ShadowMasks`] may have.
+pub const SHADOW_FORMATS: [vk::Format; 5] =
+    [vk::Format::R8_UNORM, vk::Format::R16_UNORM, vk::Format::R16_SFLOAT, vk::Format::R32_SFLOAT, vk::Format::R8G8B8A8_UNORM];
+
 /// How the environment is used in a frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EnvironmentUse {
@@ -63,6 +78,8 @@ pub struct FrameInputs<'a> {
     pub environment: EnvironmentUse,
     /// Lights beside it, at most [`MAX_LIGHTS`](crate::light::MAX_LIGHTS).
     pub lights: &'a [Light],
+    /// What shadows them, if the host knows.
+    pub shadows: Option<ShadowMasks>,
     /// For [`crate::Rate::Given`]: the level of each sample, in levels over a sample (0 is finest), in an image of
     /// `R8_UINT` and of the samples' extent, sampled between its entry and exit. Coarser than the configuration's coarsest
     /// counts as that.
@@ -71,6 +88,25 @@ pub struct FrameInputs<'a> {
     pub seed: [u32; 2],
     /// The host's image; `None` leaves the result in the renderer's own.
     pub output: Option<Output>,
+}
+
+impl ShadowMasks {
+    /// Refuses masks that are of none of `extents`, or more than `lights`.
+    fn check(&self, extents: [[u32; 2]; 2], lights: usize) -> Result<()> {
+        let ImageRef { format, extent, .. } = self.image;
+        if !SHADOW_FORMATS.contains(&format) {
+            return Err(Error::invalid("shadows.image.format", format!("one of {SHADOW_FORMATS:?}"), format!("{format:?}")));
+        }
+        if !extents.contains(&extent) {
+            let [output, samples] = extents;
+            let expected = if output == samples { format!("{output:?}") } else { format!("{output:?} or {samples:?}") };
+            return Err(Error::invalid("shadows.image.extent", expected, format!("{extent:?}")));
+        }
+        if self.layers == 0 || self.layers as usize > lights {
+            return Err(Error::invalid("shadows.layers", format!("1 to {lights}, the number of lights"), self.layers));
+        }
+        Ok(())
+    }
 }
 
 impl<'a> FrameInputs<'a> {
@@ -82,6 +118,7 @@ impl<'a> FrameInputs<'a> {
             gbuffer,
             environment: EnvironmentUse::default(),
             lights: &[],
+            shadows: None,
             levels: None,
             seed: [0, 0],
             output: None,
@@ -114,6 +151,9 @@ impl<'a> FrameInputs<'a> {
                 }
             }
         }
+        if let Some(masks) = &self.shadows {
+            masks.check([config.extent, shading], self.lights.len())?;
+        }
         match (&self.levels, config.rate) {
             (Some(image), Rate::Given) => {
                 let got = (image.format, image.extent);
@@ -145,7 +185,7 @@ impl<'a> FrameInputs<'a> {
             sampling: [self.seed[0], self.seed[1], config.directions, 0],
             // A turn about +Y moves the map towards smaller u.
             environment: [-rotation / 360.0, intensity, 0.0, 0.0],
-            lights: [exact, area, 0, 0],
+            lights: [exact, area, self.shadows.map_or(0, |masks| masks.layers), 0],
             levels: plan.levels.uniform(),
         }
     }

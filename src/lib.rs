@@ -29,7 +29,7 @@ pub use ash;
 pub use config::{Bins, Config, Estimator, GBufferSource, Rate};
 pub use distribution::{Division, Filter, Rule};
 pub use error::{Error, Result};
-pub use frame::{EnvironmentUse, FrameInputs, GBufferInput, Output};
+pub use frame::{EnvironmentUse, FrameInputs, GBufferInput, Output, SHADOW_FORMATS, ShadowMasks};
 pub use glam;
 pub use gpu::{
     Access, AllocationError, Block, DedicatedAllocator, FrameTimings, Host, HostAllocator, ImageRef, Location, MemoryRequest,

@@ -1,4 +1,4 @@
-//! Lights beside the environment. No visibility: each adds to what the others send.
+//! Lights beside the environment. No visibility but the host's masks: each adds to what the others send.
 
 use crate::error::{Error, Result};
 use bytemuck::{Pod, Zeroable};
@@ -128,10 +128,15 @@ pub(crate) fn check(lights: &[Light]) -> Result<()> {
     lights.iter().enumerate().try_for_each(|(i, light)| light.check(i))
 }
 
-/// Records, exact lights first, and the numbers of exact and area lights.
+/// Records, exact lights first, each with its number, and the numbers of exact and area lights.
 pub(crate) fn records(lights: &[Light]) -> (Vec<LightRecord>, [u32; 2]) {
-    let (area, exact): (Vec<&Light>, Vec<&Light>) = lights.iter().partition(|l| l.is_area());
-    let records = exact.iter().chain(&area).map(|l| l.record()).collect();
+    let (area, exact): (Vec<_>, Vec<_>) = lights.iter().enumerate().partition(|(_, light)| light.is_area());
+    let record = |(i, light): &(usize, &Light)| {
+        let mut record = light.record();
+        record.edge_u[3] = *i as f32;
+        record
+    };
+    let records = exact.iter().chain(&area).map(record).collect();
     (records, [exact.len() as u32, area.len() as u32])
 }
 
@@ -145,7 +150,7 @@ mod tests {
         let point = Light::Point { position: [0.0; 3], intensity: [1.0; 3] };
         let (records, counts) = records(&[sphere, point, sphere]);
         assert_eq!(counts, [1, 2]);
-        assert_eq!(records.iter().map(|r| r.place[3]).collect::<Vec<_>>(), [0.0, 2.0, 2.0]);
+        assert_eq!(records.iter().map(|r| (r.place[3], r.edge_u[3])).collect::<Vec<_>>(), [(0.0, 1.0), (2.0, 0.0), (2.0, 2.0)]);
         let flat = Light::Rectangle { position: [0.0; 3], u: [1.0, 0.0, 0.0], v: [2.0, 0.0, 0.0], radiance: [1.0; 3] };
         assert!(check(&[sphere, flat]).unwrap_err().to_string().contains("lights[1].u, v"));
         assert!(check(&[Light::Sphere { position: [0.0; 3], radius: -1.0, radiance: [1.0; 3] }]).is_err());

@@ -18,6 +18,8 @@ pub(crate) struct Plan {
     pub factors: ImageDesc,
     /// Layers for the lobes that the filter finds; one texel where it finds none.
     pub lobes: ImageDesc,
+    /// A texel in the place of the host's masks, where it gives none.
+    pub unshadowed: ImageDesc,
     pub curvature: Option<ImageDesc>,
     pub levels: Levels,
     /// The level of each sample, where the renderer itself writes it.
@@ -145,6 +147,7 @@ impl Plan {
                 let extent = if layers > 0 { shading } else { [1, 1] };
                 ImageDesc { layers: Some(layers.max(1)), ..image("lobes", vk::Format::R32G32B32A32_UINT, extent, storage) }
             },
+            unshadowed: ImageDesc { layers: Some(1), ..image("unshadowed", vk::Format::R8_UNORM, [1, 1], sampled) },
             curvature: config.curvature.then(|| image("curvature", vk::Format::R16G16B16A16_SFLOAT, shading, storage)),
             level: (levels.top > 0 && config.rate != Rate::Given)
                 .then(|| image("level", vk::Format::R32_UINT, shading, storage | vk::ImageUsageFlags::TRANSFER_DST)),
@@ -166,6 +169,7 @@ impl Plan {
             &self.normals,
             &self.factors,
             &self.lobes,
+            &self.unshadowed,
             &self.radiance,
             &self.resolved,
         ]);
@@ -288,8 +292,8 @@ mod tests {
         assert_eq!(list(&memory_footprint(&base)), Some(4 * pixels));
         let fine = Config { samples_per_side: 4, ..base.clone() };
         assert_eq!(list(&memory_footprint(&fine)), Some(16 * 4 * pixels));
-        // surface, coordinate, derivative, normals, factors, radiance 16 bytes; ids, depth, list 4; resolved 16; a texel of lobes
-        assert_eq!(memory_footprint(&base).total(), pixels * (6 * 16 + 3 * 4 + 16) + 16 + 16 + 16 + 2 * (240 + 256 * 64));
+        // surface, coordinate, derivative, normals, factors, radiance 16 bytes; ids, depth, list 4; resolved 16; a texel of lobes, one of no masks
+        assert_eq!(memory_footprint(&base).total(), pixels * (6 * 16 + 3 * 4 + 16) + 16 + 1 + 16 + 16 + 2 * (240 + 256 * 64));
     }
 
     #[test]

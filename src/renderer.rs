@@ -193,6 +193,18 @@ impl Renderer {
             pass.record(rec, &curvature::Io { frame, bridge, samplers, normals, curvature });
         }
 
+        // What shadows lights, for whatever looks at these.
+        let shadows = match &inputs.shadows {
+            Some(masks) => {
+                rec.host_image(&masks.image, Access::COMPUTE_SAMPLED);
+                masks.image.view
+            }
+            None => {
+                rec.image(&targets.unshadowed, Access::COMPUTE_SAMPLED);
+                targets.unshadowed.view
+            }
+        };
+
         // 4  The level of every sample: predicted, by the frame before, the same, or the host's.
         let shading = targets.plan.shading;
         let analysed = environment.bandwidth.as_ref().zip(materials.bandwidths.as_ref());
@@ -214,6 +226,7 @@ impl Renderer {
                         factors,
                         lights,
                         light_count: exact + area,
+                        shadows,
                         dark: (DARK * environment.mean * f64::from(inputs.environment.intensity)) as f32,
                         level,
                         prediction,
@@ -225,7 +238,10 @@ impl Renderer {
             }
             (Some(level), _) if let (Some(pass), Some(fits)) = (&passes.residual_level, &materials.fits) => {
                 let area_lights = area > 0;
-                pass.record(rec, &residual_level::Io { frame, bridge, samplers, normals, materials, fits, area_lights, level });
+                pass.record(
+                    rec,
+                    &residual_level::Io { frame, bridge, samplers, normals, materials, fits, area_lights, shadows, level },
+                );
                 rec.image(level, Access::COMPUTE_SAMPLED);
                 Some(level.view)
             }
@@ -297,6 +313,7 @@ impl Renderer {
                     fits,
                     lights,
                     light_count,
+                    shadows,
                     radiance: targets.base.as_ref().unwrap_or(radiance),
                 },
             );
@@ -322,6 +339,7 @@ impl Renderer {
                     list: to_shade,
                     lights,
                     light_count,
+                    shadows,
                     directions,
                     residual,
                     radiance,
@@ -344,7 +362,7 @@ impl Renderer {
         if let GBufferInput::Host { images, .. } = inputs.gbuffer {
             images.iter().for_each(|image| rec.release(image));
         }
-        if let Some(image) = &inputs.levels {
+        for image in inputs.levels.iter().chain(inputs.shadows.as_ref().map(|masks| &masks.image)) {
             rec.release(image);
         }
         self.pass_bytes = std::mem::take(&mut rec.pass_bytes);

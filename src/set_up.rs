@@ -74,11 +74,14 @@ impl Renderer {
         let (eps, estimator) = (config.predicts().then_some(config.eps), config.estimator);
         let budget = config.fit_budget();
         let kept = self.of_kinds.as_ref().map(|passes| passes.kinds);
+        let former = self.materials.as_ref().map(|(_, filter)| filter);
         let (mut upload, filter, of_kinds) = Build::run(&self.cx, memory, |build| {
             let reading = Reading { filter, bins, rule, widened, passes, samplers };
             let upload = MaterialsUpload::new(build, materials, &Uploading { reading, eps, estimator, budget })?;
             let mut p = PassContext { build, modules, bridge, slots };
-            let filter = filter::Filter::new(&mut p, config, upload.uses(), upload.most_clusters())?;
+            let (uses, clusters) = (upload.uses(), upload.most_clusters());
+            let fresh = former.is_none_or(|former| !former.suits(uses, clusters));
+            let filter = fresh.then(|| filter::Filter::new(&mut p, config, uses, clusters)).transpose()?;
             let fresh = kept != Some(upload.kinds);
             let of_kinds = fresh.then(|| OfKinds::new(&mut p, config, upload.kinds)).transpose()?;
             Ok((upload, filter, of_kinds))
@@ -110,10 +113,14 @@ impl Renderer {
             // They are made from the former materials' lobes.
             former.retire(&mut self.states, &mut bag);
         }
-        if let Some((former, pass)) = self.materials.replace((fresh, filter)) {
+        let (former, pass) = self.materials.take().unzip();
+        if let Some(former) = former {
             former.retire(&mut self.states, &mut bag);
-            pass.retire(&mut bag);
         }
+        // One of both is there.
+        let (filter, unused) = if filter.is_some() { (filter, pass) } else { (pass, None) };
+        self.materials = filter.map(|filter| (fresh, filter));
+        unused.into_iter().for_each(|pass| pass.retire(&mut bag));
         if let Some(former) = of_kinds.and_then(|fresh| self.of_kinds.replace(fresh)) {
             former.retire(&mut bag);
         }

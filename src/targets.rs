@@ -21,6 +21,8 @@ pub(crate) struct Targets {
     pub factors: Image,
     /// Of each sample, as `glsl/include/lobes.glsl` reads them.
     pub lobes: Image,
+    /// In the place of the host's masks of lights, where it gives none; never read.
+    pub unshadowed: Image,
     pub curvature: Option<Image>,
     /// The level of each sample, where the renderer itself writes it.
     pub level: Option<Image>,
@@ -85,6 +87,7 @@ impl Targets {
             normals: Image::new(build, plan.normals)?,
             factors: Image::new(build, plan.factors)?,
             lobes: Image::new(build, plan.lobes)?,
+            unshadowed: Image::new(build, plan.unshadowed)?,
             curvature: plan.curvature.map(|desc| Image::new(build, desc)).transpose()?,
             level: plan.level.map(|desc| Image::new(build, desc)).transpose()?,
             prediction: plan.prediction.map(|desc| Prediction::new(build, desc)).transpose()?,
@@ -138,7 +141,8 @@ impl Targets {
         let images = self.gbuffer.into_iter().flat_map(GBufferImages::into_images);
         let (prediction, predicted) = self.prediction.map(|p| (p.image, vec![p.forecast, p.blocks])).unzip();
         let own = [self.curvature, self.level, prediction, self.base, self.odd].into_iter().flatten();
-        for image in images.chain(own).chain([self.normals, self.factors, self.lobes, self.radiance, self.resolved]) {
+        let always = [self.normals, self.factors, self.lobes, self.unshadowed, self.radiance, self.resolved];
+        for image in images.chain(own).chain(always) {
             states.forget(image.handle);
             image.retire(bag);
         }

@@ -41,6 +41,7 @@ fn world() -> World {
         size: None,
         environment: Some(EnvironmentLight { map: scene::sky().unwrap(), intensity: 1.0, rotation: 0.0, visible: false }),
         lights: Vec::new(),
+        shadows: None,
         objects: objects.collect(),
         materials: scene::materials().into_iter().enumerate().map(material).collect(),
     }
@@ -117,6 +118,7 @@ fn host_images_are_left_as_their_exit_says() {
             gbuffer: GBufferInput::Host { set: targets.set, images: &images },
             environment: EnvironmentUse::default(),
             lights: &[],
+            shadows: None,
             levels: None,
             seed: [0, 0],
             output: Some(Output { image: output, transfer: Transfer::Linear }),

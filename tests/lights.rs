@@ -25,6 +25,7 @@ fn world(model: Model, lights: &[Light]) -> World {
         size: None,
         environment: None,
         lights: lights.to_vec(),
+        shadows: None,
         objects: vec![Object {
             mesh: Arc::new(builtin::mesh("bumpy-sphere", 64).unwrap()),
             transform: Mat4::IDENTITY,

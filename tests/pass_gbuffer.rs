@@ -53,6 +53,7 @@ fn render(camera: Camera, objects: Vec<(Mesh, Mat4, usize)>) -> Vec<Sample> {
         size: None,
         environment: None,
         lights: Vec::new(),
+        shadows: None,
         objects: objects
             .into_iter()
             .map(|(mesh, transform, material)| Object { mesh: Arc::new(mesh), transform, material })
@@ -349,6 +350,7 @@ fn coordinates_are_there_where_they_are_read() {
             size: None,
             environment: None,
             lights: Vec::new(),
+            shadows: None,
             objects: vec![object],
             materials: vec![Material { name: "grey".into(), model: common::rig::grey(), maps }],
         };

@@ -63,6 +63,7 @@ fn world(map: LatLong) -> World {
         camera: Camera { position: DVec3::new(0.0, 0.5, 3.5), target: DVec3::ZERO, up: DVec3::Y, fov_y: 36.0 },
         size: None,
         lights: Vec::new(),
+        shadows: None,
         environment: Some(EnvironmentLight { map, intensity: 1.0, rotation: 0.0, visible: false }),
         objects: vec![Object { mesh: Arc::new(sphere(96, 48)), transform: Mat4::IDENTITY, material: 0 }],
         materials: vec![Material { name: "material".into(), model, maps: Default::default() }],

@@ -1,5 +1,5 @@
 // What a material reflects, by its reflectance itself, of lights that are points and directions and of an environment's suns. Include
-// after lights.glsl and approximation.glsl; the includer reads suns and declares `lights`.
+// after lights.glsl, shadows.glsl and approximation.glsl; the includer reads suns and declares `lights`.
 #ifndef DIRECT_GLSL
 #define DIRECT_GLSL
 
@@ -25,12 +25,12 @@ vec3 reflected_light(Local f, Material m, Lobes l, vec3 w, vec3 power) {
     return above ? value * power : vec3(0.0);
 }
 
-// Of exact lights, at world point p.
-vec3 reflected_lights(Local f, Material m, Lobes l, vec3 p) {
+// Of exact lights, at world point `at` of shading sample p.
+vec3 reflected_lights(Local f, Material m, Lobes l, vec3 at, ivec2 p) {
     vec3 sum = vec3(0.0);
     for (uint i = 0u; i < frame.lights.x; ++i) {
-        vec4 w = light_exact(lights[i], p);
-        sum += reflected_light(f, m, l, w.xyz, lights[i].power.rgb * w.w);
+        vec4 w = light_exact(lights[i], at);
+        sum += reflected_light(f, m, l, w.xyz, shadowed(lights[i], p) * w.w);
     }
     return sum;
 }

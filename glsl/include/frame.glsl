@@ -9,7 +9,7 @@ layout(set = 2, binding = 0, std140) uniform Frame {
     uvec4 extent;            // shading width, height; samples a side of an output pixel; environment visible
     uvec4 sampling;          // seed, frame, samples a shaded pixel
     vec4 environment;        // rotation in turns, intensity
-    uvec4 lights;            // exact lights, then area lights
+    uvec4 lights;            // exact lights, then area lights; masks of lights
     ivec4 levels[6];         // of shading: see levels.glsl
 } frame;
 

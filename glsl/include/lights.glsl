@@ -10,7 +10,7 @@ const float LIGHT_SPHERE = 2.0;
 struct LightRecord {
     vec4 place;   // world position, or direction towards the light; kind
     vec4 power;   // intensity in W/sr, irradiance, or radiance; radius
-    vec4 edge_u;  // half-edge of a rectangle
+    vec4 edge_u;  // half-edge of a rectangle; the light's number as the host counts
     vec4 edge_v;  // half-edge of a rectangle
 };
 

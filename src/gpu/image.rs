@@ -53,8 +53,8 @@ impl ImageDesc {
 /// Bytes of one texel of the formats that the frame uses.
 pub(crate) fn texel_bytes(format: vk::Format) -> u64 {
     match format {
-        vk::Format::R8_UINT => 1,
-        vk::Format::R16_SFLOAT => 2,
+        vk::Format::R8_UINT | vk::Format::R8_UNORM => 1,
+        vk::Format::R16_SFLOAT | vk::Format::R16_UNORM => 2,
         vk::Format::R32G32_SFLOAT | vk::Format::R32G32_UINT | vk::Format::R16G16B16A16_SFLOAT => 8,
         vk::Format::R32G32B32A32_SFLOAT | vk::Format::R32G32B32A32_UINT => 16,
         _ => 4,

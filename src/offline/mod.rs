@@ -32,6 +32,7 @@ pub mod render;
 pub mod scene;
 pub mod sequence;
 pub mod session;
+pub mod shadows;
 mod shown;
 pub mod stats;
 pub mod supersample;

@@ -3,7 +3,7 @@
 use crate::distribution::{LobeFit, chart};
 use crate::gpu::access::Access;
 use crate::gpu::buffer::Buffer;
-use crate::gpu::image::ImageDesc;
+use crate::gpu::image::{Image, ImageDesc};
 use crate::gpu::memory::Location;
 use crate::gpu::pipeline::{BridgeLayouts, Modules};
 use crate::gpu::recorder::{Recorder, States};
@@ -17,6 +17,7 @@ use crate::offline::prepared::Prepared;
 use crate::offline::progress::Progress;
 pub use crate::offline::read_back::MomentLevels;
 use crate::offline::read_back::copy_buffer;
+use crate::offline::shadows::Shadows;
 use crate::offline::shown::Shown;
 use crate::offline::window::{Window, near};
 use crate::offline::world::World;
@@ -100,6 +101,7 @@ impl Session {
         let mut session = Self { headless, renderer: Some(renderer), materials, meshes, shown, setup, material_bytes, record_ms };
         session.upload_objects(world, &mut HashMap::new())?;
         session.reserve_cells(world)?;
+        session.set_shadows(world.shadows.as_deref())?;
         session.setup.push((MESHES, milliseconds(clock)));
         Ok(session)
     }
@@ -155,11 +157,34 @@ impl Session {
     /// The library's or the device's.
     pub fn renew_materials(&mut self, world: &World) -> Result<SetupTimes> {
         let renderer = self.renderer.as_mut().ok_or_else(closed)?;
-        let Prepared { materials, .. } = Prepared::new(world, renderer.config(), &mut |_, _, _| ());
+        self.materials = Prepared::new(world, renderer.config(), &mut |_, _, _| ()).materials;
+        self.remake_materials()
+    }
+
+    /// The same of the materials that there are.
+    ///
+    /// # Errors
+    /// The library's or the device's.
+    pub fn remake_materials(&mut self) -> Result<SetupTimes> {
+        let renderer = self.renderer.as_mut().ok_or_else(closed)?;
+        let materials = &self.materials;
         // SAFETY: every submission is waited for; the command buffer is recording and submitted at once.
-        self.headless.submit(|cmd, memory| Ok(unsafe { renderer.record_materials(cmd, &materials, memory) }?))?;
-        self.materials = materials;
+        self.headless.submit(|cmd, memory| Ok(unsafe { renderer.record_materials(cmd, materials, memory) }?))?;
         of_maps(renderer)
+    }
+
+    /// Renders frames of another size from the next one on, of the same camera.
+    ///
+    /// # Errors
+    /// The library's or the device's.
+    pub fn resize(&mut self, extent: [u32; 2]) -> Result<()> {
+        let renderer = self.renderer.as_mut().ok_or_else(closed)?;
+        let (host, memory) = self.headless.parts()?;
+        let bag = renderer.resize(extent, memory)?;
+        // SAFETY: every submission was waited for.
+        unsafe { bag.free(host.device, memory) };
+        self.look_through(&Window::whole(extent));
+        Ok(())
     }
 
     /// The bytes that each pass of the last making of materials moved.
@@ -232,16 +257,33 @@ impl Session {
         if levels.len() as u64 != u64::from(width) * u64::from(height) {
             return Err(Error::argument("levels", format!("{width}x{height} samples"), levels.len()));
         }
-        let usage = vk::ImageUsageFlags::SAMPLED;
-        let desc = ImageDesc::new("levels", vk::Format::R8_UINT, [width, height, 1], usage);
+        let desc = ImageDesc::new("levels", vk::Format::R8_UINT, [width, height, 1], vk::ImageUsageFlags::SAMPLED);
         let former = self.shown.levels.take();
+        self.shown.levels = Some(self.upload(former, desc, levels)?);
+        Ok(())
+    }
+
+    /// Shadows the lights from the next frame on.
+    fn set_shadows(&mut self, shadows: Option<&Shadows>) -> Result<()> {
+        let Some(Shadows { extent: [width, height], layers }) = shadows else { return Ok(()) };
+        let array = Some(layers.len() as u32);
+        let usage = vk::ImageUsageFlags::SAMPLED;
+        let desc = ImageDesc { layers: array, ..ImageDesc::new("shadows", vk::Format::R32_SFLOAT, [*width, *height, 1], usage) };
+        let former = self.shown.shadows.take();
+        self.shown.shadows = Some(self.upload(former, desc, bytemuck::cast_slice(&layers.concat()))?);
+        Ok(())
+    }
+
+    /// An image that frames sample, in the place of `former`.
+    fn upload(&mut self, former: Option<Image>, desc: ImageDesc, texels: &[u8]) -> Result<Image> {
+        let renderer = self.renderer.as_mut().ok_or_else(closed)?;
         let mut fresh = None;
         self.headless.submit(|cmd, memory| {
             let mut bag = Retired::default();
             if let Some(former) = former {
                 former.retire(&mut bag);
             }
-            let upload = Build::run(renderer.context(), memory, |build| ImageUpload::new(build, desc, levels))?;
+            let upload = Build::run(renderer.context(), memory, |build| ImageUpload::new(build, desc, texels))?;
             let mut states = States::default();
             let mut rec = Recorder::new(renderer.context(), cmd, 0, &mut states, None);
             let image = upload.record(&mut rec, &mut bag);
@@ -250,8 +292,7 @@ impl Session {
             fresh = Some(image);
             Ok(bag)
         })?;
-        self.shown.levels = fresh;
-        Ok(())
+        fresh.ok_or_else(closed)
     }
 
     /// Runs a compute module of the caller's own over the session's materials and environment: local size 64, set 1 the
@@ -361,9 +402,8 @@ impl Session {
 impl Drop for Session {
     fn drop(&mut self) {
         let mut bag = self.renderer.take().map_or_else(Retired::default, Renderer::destroy);
-        if let Some(image) = self.shown.levels.take() {
-            image.retire(&mut bag);
-        }
+        let images = [self.shown.levels.take(), self.shown.shadows.take()];
+        images.into_iter().flatten().for_each(|image| image.retire(&mut bag));
         self.meshes.drain().for_each(|(_, buffers)| buffers.retire(&mut bag));
         if let Ok((host, memory)) = self.headless.parts() {
             // SAFETY: every submission was waited for.

@@ -4,7 +4,20 @@ use crate::gpu::access::{Access, ImageRef};
 use crate::gpu::image::Image;
 use crate::offline::window::{Window, near};
 use crate::offline::world::{Camera, World};
-use crate::{Draw, EnvironmentUse, FrameInputs, GBufferInput, Light, View};
+use crate::{Draw, EnvironmentUse, FrameInputs, GBufferInput, Light, ShadowMasks, View};
+
+/// An image of the session's own that frames sample.
+fn sampled(image: &Image) -> ImageRef {
+    ImageRef {
+        image: image.handle,
+        view: image.view,
+        format: image.desc.format,
+        extent: image.extent(),
+        aspect: image.desc.aspect(),
+        entry: Access::COMPUTE_SAMPLED,
+        exit: Access::COMPUTE_SAMPLED,
+    }
+}
 
 /// What every frame of a session shows.
 pub(super) struct Shown {
@@ -14,6 +27,8 @@ pub(super) struct Shown {
     pub draws: Vec<Draw>,
     pub environment: EnvironmentUse,
     pub lights: Vec<Light>,
+    /// Masks of the lights, in layers.
+    pub shadows: Option<Image>,
     /// Of [`crate::Rate::Given`].
     pub levels: Option<Image>,
 }
@@ -36,23 +51,17 @@ impl Shown {
             draws: Vec::new(),
             environment,
             lights: world.lights.clone(),
+            shadows: None,
             levels: None,
         }
     }
 
     /// Of a frame with this seed.
     pub fn inputs(&self, seed: [u32; 2]) -> FrameInputs<'_> {
-        let Self { view, draws, environment, lights, levels, .. } = self;
+        let Self { view, draws, environment, lights, shadows, levels, .. } = self;
         let frame = FrameInputs::new(0, *view, GBufferInput::Draws(draws));
-        let levels = levels.as_ref().map(|image| ImageRef {
-            image: image.handle,
-            view: image.view,
-            format: image.desc.format,
-            extent: image.extent(),
-            aspect: image.desc.aspect(),
-            entry: Access::COMPUTE_SAMPLED,
-            exit: Access::COMPUTE_SAMPLED,
-        });
-        FrameInputs { environment: *environment, lights, seed, levels, ..frame }
+        let levels = levels.as_ref().map(sampled);
+        let shadows = shadows.as_ref().map(|image| ShadowMasks { image: sampled(image), layers: image.desc.layers.unwrap_or(1) });
+        FrameInputs { environment: *environment, lights, shadows, seed, levels, ..frame }
     }
 }

@@ -132,6 +132,7 @@ impl Settings {
         refuse(!known, "--estimator", "mis or brdf", format!("{estimator:?}"))?;
         refuse(self.reference.is_some(), "--reference", "none", self.reference.unwrap_or_default().to_string())?;
         refuse(!self.aovs.is_empty(), "--aov", "none", format!("{} layers", self.aovs.len()))?;
+        refuse(world.shadows.is_some(), "lights.shadow", "none", "masks of whole pixels".into())?;
         let [least, most] = SAMPLES;
         refuse(!(least..=most).contains(&samples), "--samples", &format!("{least} to {most}"), samples.to_string())?;
         let shines = world.environment.as_ref().is_some_and(|e| e.intensity > 0.0);

@@ -1,6 +1,7 @@
 //! A scene that has been read and resolved: everything in memory, ready to be uploaded or integrated.
 
 use crate::offline::mesh::Mesh;
+use crate::offline::shadows::Shadows;
 use crate::reflectance::Model;
 use crate::sampling::LatLong;
 use crate::{Light, Maps};
@@ -106,6 +107,8 @@ pub struct World {
     pub environment: Option<EnvironmentLight>,
     /// Lights beside it.
     pub lights: Vec<Light>,
+    /// What shadows them, as the camera sees it.
+    pub shadows: Option<Arc<Shadows>>,
     /// Objects in scene order.
     pub objects: Vec<Object>,
     /// Materials, indexed by the objects.

@@ -54,6 +54,7 @@ pub const INTERFACE: Interface = Interface {
         D::STORAGE_BUFFER,
         D::STORAGE_BUFFER,
         D::STORAGE_BUFFER,
+        D::COMBINED_IMAGE_SAMPLER,
     ],
 };
 
@@ -144,6 +145,8 @@ pub(crate) struct Io<'a> {
     /// Exact lights first.
     pub lights: &'a Buffer,
     pub light_count: u32,
+    /// Masks of them, in an array.
+    pub shadows: vk::ImageView,
     /// Out: the level of each sample, in levels over a sample; 0 where all samples are shaded.
     pub level: &'a Image,
     /// Radiance that is added to the mean where directions are shared out by relative deviation.
@@ -247,6 +250,7 @@ impl Bandwidth {
             Resource::Buffer(forecast),
             Resource::Buffer(blocks),
             Resource::Buffer(&io.material_bandwidths.textures),
+            Resource::View(io.shadows, io.samplers.nearest),
         ];
         let pipeline = &self.pipelines[usize::from(io.light_count > 0)];
         let push = Push { all, dark: io.dark, ..self.push };

@@ -15,7 +15,7 @@ use crate::light::Light;
 use crate::pass::materials::MaterialImages;
 use crate::pass::prefilter::Prefiltered;
 use crate::pass::{PassContext, shade};
-use ash::vk::DescriptorType as D;
+use ash::vk::{self, DescriptorType as D};
 
 /// Pass, shader, label, timer and AOV name.
 pub const NAME: &str = "base";
@@ -39,6 +39,7 @@ pub const INTERFACE: Interface = Interface {
         D::STORAGE_BUFFER,
         D::COMBINED_IMAGE_SAMPLER,
         D::STORAGE_BUFFER,
+        D::COMBINED_IMAGE_SAMPLER,
     ],
 };
 
@@ -56,12 +57,15 @@ pub(crate) struct Io<'a> {
     /// Exact ones, as [`check_lights`] says.
     pub lights: &'a Buffer,
     pub light_count: u32,
+    /// Masks of them, in an array.
+    pub shadows: vk::ImageView,
     /// Out: linear radiance where covered.
     pub radiance: &'a Image,
 }
 
-/// One pipeline for frames without lights beside the environment, one for frames with.
-pub(crate) struct Base([ComputePipeline; 2]);
+/// Pipelines for frames without suns and lights beside the environment, with suns alone, and with lights: what evaluates them takes time
+/// where there are none, too, on devices that run a loop's body once, masked.
+pub(crate) struct Base([ComputePipeline; 3]);
 
 /// Refuses lights that would have to be sampled.
 pub(crate) fn check_lights(lights: &[Light]) -> Result<()> {
@@ -73,9 +77,9 @@ pub(crate) fn check_lights(lights: &[Light]) -> Result<()> {
 
 impl Base {
     pub fn new(p: &mut PassContext<'_, '_>, config: &Config, kinds: Kinds) -> Result<Self> {
-        let mut make = |lights| {
-            // Constants 2 to 5 are of no use here.
-            let own = [u32::from(config.widened()), lights, 0, 0, 0, 0];
+        let mut make = |lights, suns| {
+            // Constants 3 to 5 are of no use here.
+            let own = [u32::from(config.widened()), lights, suns, 0, 0, 0];
             let constants: Vec<_> = own
                 .into_iter()
                 .chain(shade::lobe_constants(config, kinds))
@@ -83,7 +87,7 @@ impl Base {
                 .collect();
             ComputePipeline::new(p.build, p.modules, &INTERFACE, p.bridge, p.slots, &constants)
         };
-        Ok(Self([make(0)?, make(1)?]))
+        Ok(Self([make(0, 0)?, make(0, 1)?, make(1, 1)?]))
     }
 
     pub fn record(&self, rec: &mut Recorder<'_>, io: &Io<'_>) {
@@ -109,8 +113,9 @@ impl Base {
             suns,
             Resource::Sampled(io.lobes, io.samplers.nearest),
             Resource::Buffer(io.fits),
+            Resource::View(io.shadows, io.samplers.nearest),
         ];
-        let pipeline = &self.0[usize::from(io.light_count > 0)];
+        let pipeline = &self.0[if io.light_count > 0 { 2 } else { usize::from(io.prefiltered.has_suns) }];
         pipeline.bind(rec, io.bridge, &resources, &());
         pipeline.dispatch(rec, io.normals.extent());
         rec.end();

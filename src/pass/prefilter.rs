@@ -132,6 +132,8 @@ pub(crate) struct Prefiltered {
     pub irradiance: Image,
     /// A `SunList`.
     pub suns: Buffer,
+    /// Whether it holds any.
+    pub has_suns: bool,
 }
 
 /// What one recording needs.
@@ -142,6 +144,7 @@ pub(crate) struct Work {
     /// Both of the chain, irradiance.
     images: [Image; 3],
     suns: BufferUpload,
+    has_suns: bool,
     /// Texels of all levels of each, one after another.
     texels: Buffer,
     /// Grids of even and of odd levels.
@@ -217,7 +220,9 @@ impl Prefilter {
             make("environment irradiance", IRRADIANCE.extent(0), 1)?,
         ];
         let storage = vk::BufferUsageFlags::STORAGE_BUFFER;
-        let suns = BufferUpload::new(build, "suns", storage, bytemuck::bytes_of(&SunList::of(map, chain)))?;
+        let list = SunList::of(map, chain);
+        let has_suns = list.count[0] > 0;
+        let suns = BufferUpload::new(build, "suns", storage, bytemuck::bytes_of(&list))?;
         let mut buffer = |name, texels, usage| Buffer::new(build, name, texels * TEXEL, usage, Location::Device);
         let [.., end] = starts(chain);
         let texels = buffer("prefiltered texels", end, storage | vk::BufferUsageFlags::TRANSFER_SRC)?;
@@ -238,12 +243,12 @@ impl Prefilter {
         // Two points for each texel of the map that is finer, so that none is missed.
         let refine = 2 * size[0].div_ceil(chain.width).max(size[1].div_ceil(chain.width / 2)) as i32;
         let same_size = size == [chain.width, chain.width / 2];
-        Ok(Work { chain, same_size, refine, images, suns, texels, grids: [even, odd], sets })
+        Ok(Work { chain, same_size, refine, images, suns, has_suns, texels, grids: [even, odd], sets })
     }
 
     /// Records it; what is not looked up goes into `bag`.
     pub fn record(&self, rec: &mut Recorder<'_>, io: &Io<'_>, work: Work, bag: &mut Retired) -> Prefiltered {
-        let Work { chain, same_size, refine, images, suns, texels, grids, sets } = work;
+        let Work { chain, same_size, refine, images, suns, has_suns, texels, grids, sets } = work;
         rec.begin(NAME);
         let suns = suns.record(rec, bag);
         rec.image(io.map, Access::COMPUTE_SAMPLED);
@@ -313,7 +318,7 @@ impl Prefilter {
         }
         sets.into_iter().for_each(|sets| sets.retire(bag));
         let [first, second, irradiance] = images;
-        Prefiltered { chain: [first, second], irradiance, suns }
+        Prefiltered { chain: [first, second], irradiance, suns, has_suns }
     }
 
     pub fn retire(self, bag: &mut Retired) {

@@ -12,7 +12,7 @@ use crate::gpu::retire::Retired;
 use crate::gpu::sampler::Samplers;
 use crate::pass::PassContext;
 use crate::pass::materials::MaterialImages;
-use ash::vk::DescriptorType as D;
+use ash::vk::{self, DescriptorType as D};
 use bytemuck::{Pod, Zeroable};
 
 /// Pass, shader, label and timer name.
@@ -25,7 +25,7 @@ pub const INTERFACE: Interface = Interface {
     push_bytes: size_of::<Push>() as u32,
     gbuffer: true,
     materials: true,
-    own: &[D::UNIFORM_BUFFER, D::COMBINED_IMAGE_SAMPLER, D::STORAGE_BUFFER, D::STORAGE_IMAGE],
+    own: &[D::UNIFORM_BUFFER, D::COMBINED_IMAGE_SAMPLER, D::STORAGE_BUFFER, D::STORAGE_IMAGE, D::COMBINED_IMAGE_SAMPLER],
 };
 
 #[repr(C)]
@@ -47,6 +47,8 @@ pub(crate) struct Io<'a> {
     pub fits: &'a Buffer,
     /// Whether residuals hold area lights, of which fits know nothing: then each sample is shaded for itself.
     pub area_lights: bool,
+    /// Masks of lights, in an array.
+    pub shadows: vk::ImageView,
     /// Out: the level of each sample, in levels over a sample.
     pub level: &'a Image,
 }
@@ -73,6 +75,7 @@ impl ResidualLevel {
             Resource::Sampled(io.normals, io.samplers.nearest),
             Resource::Buffer(io.fits),
             Resource::Storage(io.level.view),
+            Resource::View(io.shadows, io.samplers.nearest),
         ];
         let errors = if io.area_lights { [-1.0; 2] } else { self.1.errors };
         self.0.bind(rec, io.bridge, &resources, &Push { errors, ..self.1 });

@@ -17,7 +17,7 @@ use crate::pass::PassContext;
 use crate::pass::environment::EnvironmentImages;
 use crate::pass::materials::MaterialImages;
 use crate::plan::Directions;
-use ash::vk::DescriptorType as D;
+use ash::vk::{self, DescriptorType as D};
 use bytemuck::{Pod, Zeroable};
 
 /// Pass, shader, label and timer name.
@@ -45,6 +45,7 @@ pub const INTERFACE: Interface = Interface {
         D::STORAGE_BUFFER,
         D::COMBINED_IMAGE_SAMPLER,
         D::STORAGE_BUFFER,
+        D::COMBINED_IMAGE_SAMPLER,
     ],
 };
 
@@ -75,6 +76,8 @@ pub(crate) struct Io<'a> {
     /// Exact lights first.
     pub lights: &'a Buffer,
     pub light_count: u32,
+    /// Masks of them, in an array.
+    pub shadows: vk::ImageView,
     pub directions: Directions,
     pub residual: Option<Residual<'a>>,
     /// Out: linear radiance where listed.
@@ -190,6 +193,7 @@ impl Shade {
             Resource::Buffer(io.residual.map_or(io.lights, |r| r.fits)),
             Resource::Sampled(io.residual.map_or(io.normals, |r| r.base), io.samplers.nearest),
             Resource::Buffer(io.residual.map_or(io.lights, |r| r.suns)),
+            Resource::View(io.shadows, io.samplers.nearest),
         ];
         let Directions { brdf, environment, light } = io.directions;
         let offset = io.residual.map_or(0.0, |r| r.offset);

@@ -226,6 +226,7 @@ impl Target {
             gbuffer: GBufferInput::Draws(draws),
             environment: EnvironmentUse::default(),
             lights: &[],
+            shadows: None,
             levels: None,
             seed: [7, 0],
             output: Some(Output { image: self.image, transfer: Transfer::Linear }),

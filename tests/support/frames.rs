@@ -39,6 +39,7 @@ pub fn world(mesh: &str, detail: u32, model: Model, map: LatLong) -> World {
         size: None,
         environment: Some(EnvironmentLight { map, intensity: 1.0, rotation: 0.0, visible: false }),
         lights: Vec::new(),
+        shadows: None,
         objects: vec![Object { mesh: Arc::new(builtin::mesh(mesh, detail).unwrap()), transform: turn, material: 0 }],
         materials: vec![Material { name: "material".into(), model, maps: Default::default() }],
     }

@@ -3,6 +3,7 @@
 use crate::offline::bench::cases::Half;
 use crate::offline::bench::equal::Is;
 use crate::offline::bench::report::{Row, SceneReport, SpeedUp, middle};
+use crate::offline::bench::runner::Part;
 use crate::offline::bench::statistics::{Ratio, ratio_of_medians};
 use crate::offline::bench::table::Target;
 use serde::Serialize;
@@ -27,7 +28,7 @@ pub struct Reached {
     pub psnr: f64,
     /// Its error, relative.
     pub relmse: f64,
-    /// The fastest variant of each of [`WAYS`] that is as good by both, if there is one.
+    /// The fastest variant of each of [`WAYS`] with default settings that is as good by both, if there is one.
     pub ways: Vec<Option<Way>>,
     /// Time of the frame that only looks light up, over that of a direction of full rate at all covered pixels.
     pub base_cost: Option<f64>,
@@ -62,7 +63,8 @@ pub fn lines(scenes: &[SceneReport]) -> Vec<Reached> {
 fn line(scene: &SceneReport, directions: u32) -> Option<Reached> {
     let full = scene.row(&format!("full {directions}"))?;
     let error = full.error.as_ref()?;
-    let is = |row: &Row, way: &str| row.settings.get("estimator").is_some_and(|e| e == way);
+    // What would suit a scene is known only afterwards.
+    let is = |row: &Row, way: &str| row.part == Part::Compared && row.settings.get("estimator").is_some_and(|e| e == way);
     let way = |name: &&str| {
         let reached = scene.variants.iter().filter(|row| is(row, name)).filter_map(|row| {
             let own = row.error.as_ref().filter(|own| own.psnr >= error.psnr && own.relmse <= error.relmse)?;

@@ -88,6 +88,8 @@ pub(super) struct Light {
     pub intensity: Key<Triple>,
     pub irradiance: Key<Triple>,
     pub radiance: Key<Triple>,
+    /// A file with its mask.
+    pub shadow: Key<String>,
 }
 
 #[derive(Debug, Deserialize)]

@@ -3,7 +3,11 @@
 use crate::offline::error::Result;
 use crate::offline::scene::check::{Check, single, span};
 use crate::offline::scene::format::{Key, Light, SceneFile, Triple, Vector};
+use crate::offline::shadows::Shadows;
+use crate::offline::texture;
 use glam::DVec3;
+use std::path::Path;
+use std::sync::Arc;
 use toml::Spanned;
 
 impl Check<'_> {
@@ -52,8 +56,17 @@ impl Check<'_> {
                 c.require(fits, &v.span(), "finite channels >= 0", format!("{rgb:?}"))
             })?;
         }
-        Ok(())
+        self.each(&l.shadow, |c, v| c.extension(v, &texture::EXTENSIONS).map(drop))
     }
+}
+
+/// Their masks, of files under `folder`.
+///
+/// # Errors
+/// Of the files.
+pub(super) fn shadows(file: &SceneFile, folder: &Path) -> Result<Option<Arc<Shadows>>> {
+    let masks: Vec<_> = file.lights.iter().map(|l| l.get_ref().shadow.as_ref().map(|file| folder.join(file.get_ref()))).collect();
+    Ok(Shadows::read(masks.iter().map(Option::as_deref))?.map(Arc::new))
 }
 
 /// The lights of a checked file.

@@ -64,6 +64,7 @@ pub(super) fn world(scene: &Scene) -> Result<(World, Vec<usize>)> {
         size: file.camera.as_ref().and_then(|camera| camera.size.as_ref()).map(|size| *size.get_ref()),
         environment: environment_light(scene)?,
         lights: lights::lights(file),
+        shadows: lights::shadows(file, &scene.folder)?,
         objects,
         materials: all,
     };

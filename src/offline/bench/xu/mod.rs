@@ -26,8 +26,10 @@ use crate::offline::world::World;
 use crate::{Config, Estimator, Filter, Requirements};
 use cases::{Light, Shot};
 use report::{Report, Row, SceneReport, TruthReport};
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
+use times::SetUp;
 use truths::Truths;
 
 /// Whose scenes and aims.
@@ -146,9 +148,10 @@ pub fn run(
         animated.show(frame);
         let world = animated.into_world();
         let config = scene.config(order.extent.unwrap_or(order.preset.still()));
+        let mut made = BTreeMap::new();
         for light in Light::ALL {
             let stage = Stage { order, light, world: light.alone_in(&world)?, config: &config, rounds: report.head.rounds };
-            let scene = stage.measure(&mut report, &mut keep, progress)?;
+            let scene = stage.measure(&mut made, &mut report, &mut keep, progress)?;
             report.scenes.push(scene);
             if cameras.len() > 1 {
                 let name = format!("{}, {}", stage.world.name, light.name());
@@ -197,21 +200,14 @@ impl Stage<'_> {
         Config { frames_in_flight: 1, filter, extent, estimator, directions, anisotropy, ..self.config.clone() }
     }
 
-    /// A session for frames of which differences from one to the next matter, or why there is none; and whether anything is drawn in them:
-    /// under an environment light is looked up, unless a material refuses that.
-    fn moving(&self, filter: Filter, extent: [u32; 2], directions: u32) -> Result<(std::result::Result<Session, String>, bool)> {
-        let drawing = self.config(filter, extent, directions);
-        if self.light == Light::Environment {
-            let looking_up = Config { estimator: Estimator::Preconvolved, ..drawing.clone() };
-            if let Ok(session) = open(&self.world, &looking_up, self.device())? {
-                return Ok((Ok(session), filter.is_random()));
-            }
-        }
-        let drawn = filter.is_random() || self.light == Light::Environment;
-        Ok((open(&self.world, &drawing, self.device())?, drawn))
-    }
-
-    fn measure(&self, report: &mut Report, keep: &mut Option<&mut Keep<'_>>, progress: &mut Progress<'_>) -> Result<SceneReport> {
+    /// `made` is what making maps took under the scene's other light, if that was measured.
+    fn measure(
+        &self,
+        made: &mut BTreeMap<&'static str, SetUp>,
+        report: &mut Report,
+        keep: &mut Option<&mut Keep<'_>>,
+        progress: &mut Progress<'_>,
+    ) -> Result<SceneReport> {
         let name = format!("{}, {}", self.world.name, self.light.name());
         let mut told = |what: &str, done, total| progress(&format!("{name}: {what}"), done, total);
         let extent = self.config.extent;
@@ -226,7 +222,7 @@ impl Stage<'_> {
         })?;
         report.seconds.references += clock.elapsed().as_secs_f64();
 
-        let mut stills = stills::take(self, &truth, &mut rows, &mut |done, total| told("images", done, total))?;
+        let (mut stills, mut kept) = stills::take(self, &truth, &mut rows, &mut |done, total| told("images", done, total))?;
         let clock = Instant::now();
         let smallest = rows.iter().filter_map(|r| r.errors.as_ref()).map(|e| e.rmse).fold(f64::INFINITY, f64::min);
         let goal = Goal { noise: smallest / MARGIN, most: self.order.preset.most_samples().into() };
@@ -240,9 +236,10 @@ impl Stage<'_> {
 
         let flicker_noise = match self.order.preset {
             Preset::Quick => None,
-            Preset::Full => Some(motion::flicker(self, &mut rows, report, &mut told)?),
+            Preset::Full => Some(motion::flicker(self, &mut rows, &mut kept, report, &mut told)?),
         };
-        let cost = times::measure(self, &mut rows, report.copy_gb_per_s, &mut |done, total| told("frames", done, total))?;
+        let frames = &mut |done, total| told("frames", done, total);
+        let cost = times::measure(self, &mut rows, kept, report.copy_gb_per_s, made, frames)?;
         if let Some(keep) = keep.as_mut() {
             keep(&self.world.name, strips::strip(self, &truth, &stills, &rows))?;
         }

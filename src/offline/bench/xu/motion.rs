@@ -3,6 +3,7 @@
 use crate::offline::bench::quality::Frame;
 use crate::offline::bench::reference::Goal;
 use crate::offline::bench::xu::report::{Flicker, Report, Row};
+use crate::offline::bench::xu::stills::Kept;
 use crate::offline::bench::xu::truths::Truths;
 use crate::offline::bench::xu::{Stage, finite, stills};
 use crate::offline::error::Result;
@@ -17,8 +18,6 @@ pub const FRAMES: u32 = 16;
 const MOST_SIDE: u32 = 128;
 /// Joint sub-samples of each truth: fewer than of a still, as there are many. What their noise makes of flicker is reported.
 const SAMPLES: u32 = 512;
-/// Directions of a frame under an environment that a material does not let be looked up.
-const DIRECTIONS: u32 = 256;
 /// Of frames.
 const SEED: u32 = 4;
 
@@ -46,16 +45,17 @@ impl Motion {
     }
 }
 
-/// Flicker of every filter that took the still, into its row; and that of truths, from their halves.
+/// Flicker of every filter that took the still, in the session that is `kept` of it, into its row; and that of truths, from their halves.
 pub(super) fn flicker(
     stage: &Stage<'_>,
     rows: &mut [Row],
+    kept: &mut [Kept],
     report: &mut Report,
     told: &mut dyn FnMut(&str, u64, u64),
 ) -> Result<Flicker> {
-    let mut found: Vec<[f64; 2]> = vec![[0.0; 2]; rows.len()];
+    let mut found: Vec<[f64; 2]> = vec![[0.0; 2]; kept.len()];
     let mut noise = [0.0; 2];
-    let filters = &stage.order.filters;
+    let frames_of = kept.len() as u64;
     let total = u64::from(FRAMES);
     let extent = stage.config.extent.map(|e| e.min(MOST_SIDE));
     for (which, motion) in [Motion::Zoom, Motion::Orbit].into_iter().enumerate() {
@@ -78,28 +78,29 @@ pub(super) fn flicker(
         };
         // The difference of halves has twice the spread of their mean.
         noise[which] = of(&halves[0], &halves[1])? / 2.0;
-        for (done, ((filter, row), found)) in (1..).zip(filters.iter().copied().zip(rows.iter()).zip(&mut found)) {
+        for (done, (Kept { filter, session, .. }, found)) in (1..).zip(kept.iter_mut().zip(&mut found)) {
             // What is drawn anew in each frame flickers by that.
-            let session = match row.refused {
-                None if !filter.is_random() => stage.moving(filter, extent, DIRECTIONS)?.0.ok(),
-                _ => None,
-            };
-            if let Some(mut session) = session {
+            if !filter.is_random() {
                 let mut world = stage.world.clone();
                 let mut frames = Vec::new();
+                session.resize(extent)?;
                 for (number, camera) in (0..).zip(&cameras) {
                     world.camera = *camera;
                     session.show(&world)?;
                     session.frame([SEED, number])?;
-                    frames.push(Frame::read(&mut session)?.picture);
+                    frames.push(Frame::read(session)?.picture);
                 }
+                session.resize(stage.config.extent)?;
+                session.show(&stage.world)?;
                 found[which] = of(&frames, &pictures)?;
             }
-            told("moving frames", done, filters.len() as u64);
+            told("moving frames", done, frames_of);
         }
     }
-    for ((row, filter), [zoom, orbit]) in rows.iter_mut().zip(filters).zip(found) {
-        row.flicker = (row.refused.is_none() && !filter.is_random()).then_some(Flicker { zoom, orbit });
+    for (kept, [zoom, orbit]) in kept.iter().zip(found).filter(|(kept, _)| !kept.filter.is_random()) {
+        if let Some(row) = rows.iter_mut().find(|row| row.filter == kept.filter.name()) {
+            row.flicker = Some(Flicker { zoom, orbit });
+        }
     }
     let [zoom, orbit] = noise;
     Ok(Flicker { zoom, orbit })

@@ -32,40 +32,55 @@ pub(super) struct Still {
     noise: f64,
 }
 
+/// A filter's session, kept from its image on.
+pub(super) struct Kept {
+    pub filter: Filter,
+    pub session: Session,
+    /// Whether light is looked up in its frames.
+    pub looks_up: bool,
+}
+
 /// Pixels that surfaces cover wholly.
 pub(super) fn mask(truth: &Converged) -> Vec<bool> {
     truth.image().coverage.iter().map(|a| *a >= WHOLE).collect()
 }
 
-/// Renders and judges all filters; those that refuse have it in their row.
+/// Renders and judges all filters; those that refuse have it in their row. The sessions of the others.
 pub(super) fn take(
     stage: &Stage<'_>,
     truth: &Converged,
     rows: &mut [Row],
     progress: &mut dyn FnMut(u64, u64),
-) -> Result<Vec<Still>> {
-    let (extent, total) = (stage.config.extent, rows.len() as u64);
+) -> Result<(Vec<Still>, Vec<Kept>)> {
+    let total = rows.len() as u64;
     let reference = (truth.image().picture, mask(truth));
-    let mut stills = Vec::new();
+    let (mut stills, mut kept) = (Vec::new(), Vec::new());
     for (done, (filter, row)) in (1..).zip(stage.order.filters.iter().copied().zip(rows.iter_mut())) {
-        let config = stage.config(filter, extent, DIRECTIONS);
-        match open(&stage.world, &config, stage.device())? {
+        let drawing = stage.config(filter, stage.config.extent, DIRECTIONS);
+        let looking_up = Config { estimator: Estimator::Preconvolved, ..drawing.clone() };
+        // Of points the same is summed exactly by all.
+        let mut looked_up = open(&stage.world, &looking_up, stage.device())?.ok();
+        let shared = if stage.light == Light::Point { looked_up.take() } else { None };
+        let (config, drawn) = match shared {
+            Some(session) => (&looking_up, Ok(session)),
+            None => (&drawing, open(&stage.world, &drawing, stage.device())?),
+        };
+        match drawn {
             Ok(mut session) => {
                 let (picture, frames, noise) = average(stage, filter, &mut session, (&reference.0, &reference.1))?;
-                row.lobes = lobes(&mut session, &config)?;
-                let preconvolved = match stage.light {
-                    Light::Point => None,
-                    Light::Environment => preconvolved(stage, &config)?,
-                };
+                row.lobes = lobes(&mut session, config)?;
+                let preconvolved = looked_up.as_mut().map(frame).transpose()?;
                 let directions = if stage.light == Light::Point { 0 } else { frames * DIRECTIONS };
                 stills.push(Still { filter, picture, preconvolved, directions, noise });
+                let looks_up = looked_up.is_some() || config.estimator == Estimator::Preconvolved;
+                kept.push(Kept { filter, session: looked_up.unwrap_or(session), looks_up });
             }
             Err(reason) => row.refused = Some(reason),
         }
         progress(done, total);
     }
     judge(&mut stills, truth, rows)?;
-    Ok(stills)
+    Ok((stills, kept))
 }
 
 /// The mean of enough frames, how many they are, and their noise as a part of the mean.
@@ -110,12 +125,10 @@ fn sums(picture: &Picture) -> Vec<[f64; 3]> {
     picture.rgb.iter().map(|c| c.map(f64::from)).collect()
 }
 
-/// A frame of `config` with the environment looked up; `None` where a material refuses that.
-fn preconvolved(stage: &Stage<'_>, config: &Config) -> Result<Option<Picture>> {
-    let config = Config { estimator: Estimator::Preconvolved, ..config.clone() };
-    let Ok(mut session) = open(&stage.world, &config, stage.device())? else { return Ok(None) };
+/// One frame.
+fn frame(session: &mut Session) -> Result<Picture> {
     session.frame([SEED, 0])?;
-    Ok(Some(Frame::read(&mut session)?.picture))
+    Ok(Frame::read(session)?.picture)
 }
 
 /// Lobes of the session's last frame, a covered pixel.

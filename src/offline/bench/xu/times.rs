@@ -1,12 +1,14 @@
 //! What each filter costs: maps on change, shading in every frame, beside 64 samples a pixel (Xu et al. 2017, table 1).
 //!
 //! Frames of all filters and of the supersampled one alternate. They look the environment up as it is convolved beforehand, as
-//! in the paper; its convolution is the same for all and not counted. Maps are made anew before every timed frame.
+//! in the paper; its convolution is the same for all and not counted. Maps are made anew before every timed frame under the first of a
+//! scene's lights: they are the same under the other.
 
 use crate::gpu::timer::FrameTimings;
 use crate::offline::bench::runner::{Timed, WARM_UP, interleave};
 use crate::offline::bench::statistics::{Summary, ratio_of_medians};
 use crate::offline::bench::xu::report::{Cost, Rate, Row};
+use crate::offline::bench::xu::stills::Kept;
 use crate::offline::bench::xu::{Stage, open};
 use crate::offline::error::{Error, Result};
 use crate::offline::headless::DeviceInfo;
@@ -14,6 +16,7 @@ use crate::offline::session::Session;
 use crate::offline::world::World;
 use crate::pass::{base, filter, shade, vmf_mips};
 use crate::{Config, Estimator, Filter};
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 /// Times the pixels a side of supersampling: 64 samples a pixel.
@@ -31,26 +34,30 @@ pub(super) struct Costs {
     pub supersampling: Cost,
 }
 
-/// A session whose maps are made anew before every timed frame.
-struct Subject<'a> {
-    session: Session,
-    world: &'a World,
-    /// Absent for the supersampled one.
-    filter: Option<Filter>,
-    rounds: u32,
-    /// Of every timed frame.
-    set_up_ms: Vec<f64>,
+/// What making maps took in every timed frame.
+#[derive(Clone, Default)]
+pub(super) struct SetUp {
+    ms: Vec<f64>,
     /// Of the pass that makes mips.
     mips_ms: Vec<f64>,
 }
 
-impl Timed for Subject<'_> {
+/// A session whose maps are made anew before every timed frame, until that is known.
+struct Subject {
+    session: Session,
+    /// Absent for the supersampled one.
+    filter: Option<Filter>,
+    rounds: u32,
+    set_up: SetUp,
+}
+
+impl Timed for Subject {
     fn frame(&mut self, seed: [u32; 2]) -> Result<()> {
         let timed = (WARM_UP..WARM_UP + self.rounds).contains(&seed[1]);
         if timed && self.filter.is_some_and(Filter::stores) {
-            let times = self.session.renew_materials(self.world)?;
-            self.set_up_ms.push(times.iter().map(|(_, ms)| ms).sum());
-            self.mips_ms.extend(times.iter().filter(|(name, _)| *name == vmf_mips::NAME).map(|(_, ms)| ms));
+            let times = self.session.remake_materials()?;
+            self.set_up.ms.push(times.iter().map(|(_, ms)| ms).sum());
+            self.set_up.mips_ms.extend(times.iter().filter(|(name, _)| *name == vmf_mips::NAME).map(|(_, ms)| ms));
         }
         self.session.frame(seed)
     }
@@ -60,44 +67,46 @@ impl Timed for Subject<'_> {
     }
 }
 
-/// Times of every filter that took the still, into its row; `copy` is how fast the device copies.
+/// Times of every filter that took the still, in the session that is `kept` of it where light is looked up, into its row. `copy` is how fast
+/// the device copies, and `known` what making maps took under another light, or will hold it.
 pub(super) fn measure(
     stage: &Stage<'_>,
     rows: &mut [Row],
+    kept: Vec<Kept>,
     copy: Option<Summary>,
+    known: &mut BTreeMap<&'static str, SetUp>,
     progress: &mut dyn FnMut(u64, u64),
 ) -> Result<Costs> {
     let config = |filter, extent, estimator| {
         let directions = if estimator == Estimator::Mis { DIRECTIONS } else { 1 };
         Config { estimator, directions, ..stage.config(filter, extent, DIRECTIONS) }
     };
-    let subject = |filter: Option<Filter>, extent, estimator| -> Result<std::result::Result<Subject<'_>, String>> {
-        let world = &stage.world;
-        let session = open(world, &config(filter.unwrap_or_default(), extent, estimator), stage.device())?;
-        Ok(session.map(|session| Subject {
-            session,
-            world,
-            filter,
-            rounds: stage.rounds,
-            set_up_ms: Vec::new(),
-            mips_ms: Vec::new(),
-        }))
+    let opened = |filter: Option<Filter>, extent, estimator| {
+        open(&stage.world, &config(filter.unwrap_or_default(), extent, estimator), stage.device())
     };
     let extent = stage.config.extent;
     let mut estimator = (Estimator::Preconvolved, "preconvolved");
-    let mut first = subject(None, extent.map(|e| e * FINER), estimator.0)?;
+    let mut first = opened(None, extent.map(|e| e * FINER), estimator.0)?;
     if first.is_err() {
         estimator = (Estimator::Mis, "mis");
-        first = subject(None, extent.map(|e| e * FINER), estimator.0)?;
+        first = opened(None, extent.map(|e| e * FINER), estimator.0)?;
     }
-    let mut subjects = vec![first.map_err(|reason| Error::argument("scene", "materials that can be rendered", reason))?];
-    for (filter, row) in stage.order.filters.iter().copied().zip(rows.iter_mut()).filter(|(_, row)| row.refused.is_none()) {
-        match subject(Some(filter), extent, estimator.0)? {
-            Ok(subject) => subjects.push(subject),
-            Err(reason) => row.refused = Some(reason),
+    let first = first.map_err(|reason| Error::argument("scene", "materials that can be rendered", reason))?;
+    let mut subjects = vec![Subject { session: first, filter: None, rounds: 0, set_up: SetUp::default() }];
+    for Kept { filter, session, looks_up } in kept {
+        let suits = looks_up && estimator.0 == Estimator::Preconvolved;
+        let session = if suits { Ok(session) } else { opened(Some(filter), extent, estimator.0)? };
+        let set_up = known.get(filter.name()).cloned();
+        let rounds = if set_up.is_some() { 0 } else { stage.rounds };
+        match session {
+            Ok(session) => subjects.push(Subject { session, filter: Some(filter), rounds, set_up: set_up.unwrap_or_default() }),
+            Err(reason) => {
+                rows.iter_mut().filter(|row| row.filter == filter.name()).for_each(|row| row.refused = Some(reason.clone()))
+            }
         }
     }
     let times = interleave(&mut subjects, stage.rounds, progress)?;
+    known.extend(subjects.iter().filter_map(|s| Some((s.filter?.name(), s.set_up.clone()))));
 
     let shading = |times: &[FrameTimings]| -> Vec<f64> {
         let passes = [filter::NAME, base::NAME, shade::NAME];
@@ -111,16 +120,16 @@ pub(super) fn measure(
     let (lean, texels) = (named(LEAN), texels(&stage.world));
     let plain = subjects.iter().find(|s| s.filter == Some(Filter::Point)).map_or(0, |s| s.session.material_bytes());
     let supersampled = times.first().map(|times| shading(times)).unwrap_or_default();
-    let cost = |subject: &Subject<'_>, times: &[FrameTimings]| {
+    let cost = |subject: &Subject, times: &[FrameTimings]| {
         let shade = shading(times);
-        let set_up = &subject.set_up_ms;
+        let SetUp { ms: set_up, mips_ms } = &subject.set_up;
         let both: Vec<f64> = shade.iter().zip(set_up).map(|(a, b)| a + b).collect();
         let has_maps = set_up.iter().any(|ms| *ms > 0.0);
         let set_up_ms = has_maps.then(|| Summary::of(set_up));
         let is_filter = subject.filter.is_some();
         let bytes = subject.session.set_up_bytes().iter().find(|(name, _)| *name == vmf_mips::NAME).map(|(_, bytes)| *bytes);
-        let mips = bytes.filter(|_| subject.mips_ms.iter().any(|ms| *ms > 0.0)).map(|bytes| {
-            let ms = Summary::of(&subject.mips_ms);
+        let mips = bytes.filter(|_| mips_ms.iter().any(|ms| *ms > 0.0)).map(|bytes| {
+            let ms = Summary::of(mips_ms);
             let gb_per_s = bytes as f64 / (ms.median * 1e6);
             Rate { ms, bytes, gb_per_s, of_copy: copy.map(|copy| gb_per_s / copy.median) }
         });

@@ -68,7 +68,8 @@ impl<'a> Truths<'a> {
     fn key(&mut self, camera: &Camera, [width, height]: [u32; 2]) -> String {
         let (world, unit) = (&self.world, self.unit);
         let content = self.content.get_or_insert_with(|| {
-            let World { name: _, camera: _, size: _, environment, lights, objects, materials } = world;
+            // Supersampling has no shadows.
+            let World { name: _, camera: _, size: _, shadows: _, environment, lights, objects, materials } = world;
             let mut hash = Hashed::default();
             // A hash takes any text.
             let _ = write!(hash, "{environment:?} {lights:?} {objects:?} {materials:?}");
