@@ -157,8 +157,8 @@ impl Session {
     /// The library's or the device's.
     pub fn renew_materials(&mut self, world: &World) -> Result<SetupTimes> {
         let renderer = self.renderer.as_mut().ok_or_else(closed)?;
-        self.materials = Prepared::new(world, renderer.config(), &mut |_, _, _| ()).materials;
-        self.remake_materials()
+        let Prepared { materials, .. } = Prepared::new(world, renderer.config(), &mut |_, _, _| ());
+        self.record_materials(materials)
     }
 
     /// The same of the materials that there are.
@@ -166,10 +166,14 @@ impl Session {
     /// # Errors
     /// The library's or the device's.
     pub fn remake_materials(&mut self) -> Result<SetupTimes> {
+        self.record_materials(self.materials.clone())
+    }
+
+    fn record_materials(&mut self, materials: Vec<Material>) -> Result<SetupTimes> {
         let renderer = self.renderer.as_mut().ok_or_else(closed)?;
-        let materials = &self.materials;
         // SAFETY: every submission is waited for; the command buffer is recording and submitted at once.
-        self.headless.submit(|cmd, memory| Ok(unsafe { renderer.record_materials(cmd, materials, memory) }?))?;
+        self.headless.submit(|cmd, memory| Ok(unsafe { renderer.record_materials(cmd, &materials, memory) }?))?;
+        self.materials = materials;
         of_maps(renderer)
     }
 

@@ -154,7 +154,8 @@ impl Light {
     /// # Errors
     /// Of the built-in environment.
     pub fn alone_in(self, world: &World) -> Result<World> {
-        let mut world = world.clone();
+        // Masks are of the lights that there were.
+        let mut world = World { shadows: None, ..world.clone() };
         match self {
             Self::Point => {
                 world.environment = None;
