@@ -33,7 +33,7 @@ impl Renderer {
         probe: &crate::pass::probe::Probe,
         (input, count, output): (&Buffer, u32, &Buffer),
     ) -> Result<()> {
-        let (Some(environment), Some((materials, _))) = (&self.environment, &self.materials) else {
+        let (Some(environment), Some(materials)) = (&self.environment, &self.materials) else {
             return Err(Error::CallOrder { called: "record_probe", before: "record_environment and record_materials" });
         };
         let uniform = inputs.uniform(&self.config, &self.targets.plan, [0, 0]);
@@ -57,22 +57,22 @@ impl Renderer {
 
     /// The arrays of a material's moments and of its cells, and its layers there.
     pub(crate) fn moments(&self, material: usize) -> Option<MomentArrays<'_>> {
-        self.materials.as_ref()?.0.maps.moments(material)
+        self.materials.as_ref()?.maps.moments(material)
     }
 
     /// The arrays of an object's frames and of the cells of its own in the last frame, and its layers there.
     pub(crate) fn object_cells(&self, object: u32) -> Option<MomentArrays<'_>> {
-        self.cells.as_ref()?.arrays(object, &self.materials.as_ref()?.0.maps)
+        self.cells.as_ref()?.arrays(object, &self.materials.as_ref()?.maps)
     }
 
     /// Bytes of the materials' lobe fits.
     pub(crate) fn fit_bytes(&self) -> u64 {
-        self.materials.as_ref().and_then(|(images, _)| images.fits.as_ref()).map_or(0, |fits| fits.size)
+        self.materials.as_ref().and_then(|images| images.fits.as_ref()).map_or(0, |fits| fits.size)
     }
 
     /// The fit that stands for each material where light is looked up, if one does.
     pub(crate) fn fits(&self) -> &[Option<Arc<LobeFit>>] {
-        self.materials.as_ref().map_or(&[], |(images, _)| &images.fitted)
+        self.materials.as_ref().map_or(&[], |images| &images.fitted)
     }
 
     /// Layout of set 1.

@@ -6,7 +6,8 @@ use crate::error::Result;
 use crate::gpu::retire::Retired;
 use crate::material::Material;
 use crate::pass::fits::Packed;
-use crate::pass::{PassContext, base, shade};
+use crate::pass::maps::{MapsUpload, Uses};
+use crate::pass::{PassContext, base, filter, shade};
 use crate::reflectance::Model;
 
 /// What passes are compiled for. Other materials of the same kinds need no other ones.
@@ -23,11 +24,16 @@ pub(crate) struct Kinds {
     pub models: u32,
     /// Some that depend on texture coordinates or tangents.
     pub coordinates: bool,
+    /// Classes that hold maps of each kind.
+    pub uses: Uses,
+    /// The most clusters that one has, at least 1.
+    pub most_clusters: u32,
 }
 
 impl Kinds {
-    /// `found` says of which materials the filter finds the lobes.
-    pub fn of(materials: &[Material], found: &[bool], fits: &Packed, filter: Filter, models: u32) -> Self {
+    /// Of materials with these maps and fits.
+    pub fn of(materials: &[Material], maps: &MapsUpload, fits: &Packed, filter: Filter, models: u32) -> Self {
+        let found = &maps.found;
         let layers = filter.lobe_layers() / if filter.has_slopes() { 2 } else { 1 };
         let own = |(material, found): (&Material, &bool)| match &material.model {
             _ if *found => layers,
@@ -43,6 +49,8 @@ impl Kinds {
             most_lobes: reflected.unwrap_or_default().max(fits.most as u32),
             models,
             coordinates: materials.iter().any(Material::takes_coordinates),
+            uses: maps.uses,
+            most_clusters: maps.most_clusters,
         }
     }
 }
@@ -50,6 +58,8 @@ impl Kinds {
 /// The passes.
 pub(crate) struct OfKinds {
     pub kinds: Kinds,
+    /// What maps say at the scale of a sample.
+    pub filter: filter::Filter,
     /// Where light is looked up.
     pub base: Option<base::Base>,
     /// Where directions are drawn.
@@ -61,12 +71,14 @@ impl OfKinds {
         let (looked_up, drawn) = (config.estimator.looks_up(), config.estimator != Estimator::Preconvolved);
         Ok(Self {
             kinds,
+            filter: filter::Filter::new(p, config, kinds.uses, kinds.most_clusters)?,
             base: looked_up.then(|| base::Base::new(p, config, kinds)).transpose()?,
             shade: drawn.then(|| shade::Shade::new(p, config, config.coarsest() > 0, kinds)).transpose()?,
         })
     }
 
     pub fn retire(self, bag: &mut Retired) {
+        self.filter.retire(bag);
         if let Some(pass) = self.base {
             pass.retire(bag);
         }

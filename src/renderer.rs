@@ -57,10 +57,9 @@ pub struct Renderer {
     pub(crate) passes: Passes,
     pub(crate) targets: Targets,
     /// Whether `targets` hold a frame.
-    shown: bool,
+    pub(crate) shown: bool,
     pub(crate) environment: Option<EnvironmentImages>,
-    /// With the pass that is compiled for their maps.
-    pub(crate) materials: Option<(MaterialImages, filter::Filter)>,
+    pub(crate) materials: Option<MaterialImages>,
     /// Those that are compiled for their kinds.
     pub(crate) of_kinds: Option<OfKinds>,
     /// Of objects, where these have some of their own.
@@ -135,7 +134,7 @@ impl Renderer {
         inputs.check(&self.config, self.targets.plan.shading)?;
         let before = "record_environment and record_materials";
         let set_up = (&self.environment, &self.materials, &self.of_kinds);
-        let (Some(environment), Some((materials, filter)), Some(of_kinds)) = set_up else {
+        let (Some(environment), Some(materials), Some(of_kinds)) = set_up else {
             return Err(Error::CallOrder { called: "record", before });
         };
         if let GBufferInput::Draws(draws) = inputs.gbuffer {
@@ -188,7 +187,9 @@ impl Renderer {
             mips.record_objects(rec, &vmf_mips::ObjectIo { maps, objects, draws, view_from_world });
         }
         let (normals, factors, lobes) = (&targets.normals, &targets.factors, &targets.lobes);
-        filter.record(rec, &filter::Io { frame, bridge, samplers, maps: &materials.maps, objects, normals, factors, lobes });
+        of_kinds
+            .filter
+            .record(rec, &filter::Io { frame, bridge, samplers, maps: &materials.maps, objects, normals, factors, lobes });
         if let (Some(pass), Some(curvature)) = (&passes.curvature, &targets.curvature) {
             pass.record(rec, &curvature::Io { frame, bridge, samplers, normals, curvature });
         }
@@ -370,21 +371,6 @@ impl Renderer {
         Ok(())
     }
 
-    /// Builds for another output extent. The bag holds the former images.
-    ///
-    /// # Errors
-    /// As [`Self::new`]; the renderer keeps its former extent then.
-    pub fn resize(&mut self, extent: [u32; 2], memory: &mut dyn HostAllocator) -> Result<Retired> {
-        let config = Config { extent, ..self.config.clone() };
-        config.validate()?;
-        let fresh = Build::run(&self.cx, memory, |build| Targets::new(build, &config))?;
-        self.config = config;
-        self.shown = false;
-        let mut bag = Retired::default();
-        std::mem::replace(&mut self.targets, fresh).retire(&mut self.states, &mut bag);
-        Ok(bag)
-    }
-
     /// Settings in force.
     pub fn config(&self) -> &Config {
         &self.config
@@ -412,9 +398,8 @@ impl Renderer {
         if let Some(passes) = self.of_kinds {
             passes.retire(&mut bag);
         }
-        if let Some((materials, filter)) = self.materials {
+        if let Some(materials) = self.materials {
             materials.retire(&mut self.states, &mut bag);
-            filter.retire(&mut bag);
         }
         self.targets.retire(&mut self.states, &mut bag);
         self.passes.retire(&mut bag);

@@ -1,6 +1,6 @@
-//! What is recorded when something changes: the environment, the materials.
+//! What is done when something changes: the environment, the materials, the extent.
 
-use crate::config::Bins;
+use crate::config::{Bins, Config};
 use crate::error::{Error, Result};
 use crate::gpu::memory::HostAllocator;
 use crate::gpu::pipeline::BridgeLayouts;
@@ -14,10 +14,11 @@ use crate::pass::gbuffer::{self, Draw};
 use crate::pass::maps::Reading;
 use crate::pass::materials::{MaterialsUpload, Uploading};
 use crate::pass::object_cells::{ObjectCells, Seats};
-use crate::pass::{PassContext, brdf_map, cluster_moments, filter, mixtures, vmf_mips};
+use crate::pass::{PassContext, brdf_map, cluster_moments, mixtures, vmf_mips};
 use crate::passes::layout;
 use crate::renderer::Renderer;
 use crate::sampling::LatLong;
+use crate::targets::Targets;
 use ash::vk;
 
 impl Renderer {
@@ -74,17 +75,13 @@ impl Renderer {
         let (eps, estimator) = (config.predicts().then_some(config.eps), config.estimator);
         let budget = config.fit_budget();
         let kept = self.of_kinds.as_ref().map(|passes| passes.kinds);
-        let former = self.materials.as_ref().map(|(_, filter)| filter);
-        let (mut upload, filter, of_kinds) = Build::run(&self.cx, memory, |build| {
+        let (mut upload, of_kinds) = Build::run(&self.cx, memory, |build| {
             let reading = Reading { filter, bins, rule, widened, passes, samplers };
             let upload = MaterialsUpload::new(build, materials, &Uploading { reading, eps, estimator, budget })?;
             let mut p = PassContext { build, modules, bridge, slots };
-            let (uses, clusters) = (upload.uses(), upload.most_clusters());
-            let fresh = former.is_none_or(|former| !former.suits(uses, clusters));
-            let filter = fresh.then(|| filter::Filter::new(&mut p, config, uses, clusters)).transpose()?;
             let fresh = kept != Some(upload.kinds);
             let of_kinds = fresh.then(|| OfKinds::new(&mut p, config, upload.kinds)).transpose()?;
-            Ok((upload, filter, of_kinds))
+            Ok((upload, of_kinds))
         })?;
         let mut bag = Retired::default();
         self.set_up.restart(&self.cx, cmd, 0);
@@ -113,17 +110,27 @@ impl Renderer {
             // They are made from the former materials' lobes.
             former.retire(&mut self.states, &mut bag);
         }
-        let (former, pass) = self.materials.take().unzip();
-        if let Some(former) = former {
+        if let Some(former) = self.materials.replace(fresh) {
             former.retire(&mut self.states, &mut bag);
         }
-        // One of both is there.
-        let (filter, unused) = if filter.is_some() { (filter, pass) } else { (pass, None) };
-        self.materials = filter.map(|filter| (fresh, filter));
-        unused.into_iter().for_each(|pass| pass.retire(&mut bag));
         if let Some(former) = of_kinds.and_then(|fresh| self.of_kinds.replace(fresh)) {
             former.retire(&mut bag);
         }
+        Ok(bag)
+    }
+
+    /// Builds for another output extent. The bag holds the former images.
+    ///
+    /// # Errors
+    /// As [`Self::new`]; the renderer keeps its former extent then.
+    pub fn resize(&mut self, extent: [u32; 2], memory: &mut dyn HostAllocator) -> Result<Retired> {
+        let config = Config { extent, ..self.config.clone() };
+        config.validate()?;
+        let fresh = Build::run(&self.cx, memory, |build| Targets::new(build, &config))?;
+        self.config = config;
+        self.shown = false;
+        let mut bag = Retired::default();
+        std::mem::replace(&mut self.targets, fresh).retire(&mut self.states, &mut bag);
         Ok(bag)
     }
 
@@ -137,7 +144,7 @@ impl Renderer {
     pub fn reserve_cells(&mut self, draws: &[Draw], memory: &mut dyn HostAllocator) -> Result<Retired> {
         let mut bag = Retired::default();
         let (Bins::Camera, Some((_, mips, ..))) = (self.config.bins, &self.passes.moments) else { return Ok(bag) };
-        let Some((materials, _)) = &self.materials else {
+        let Some(materials) = &self.materials else {
             return Err(Error::CallOrder { called: "reserve_cells", before: "record_materials" });
         };
         gbuffer::check(draws)?;
@@ -155,7 +162,7 @@ impl Renderer {
     /// Texels of the map of which each draw of a material makes cells of its own, if it does: what
     /// [`chart::check`](crate::distribution::chart::check) takes.
     pub fn cell_map(&self, material: u32) -> Option<[u32; 2]> {
-        Some(self.materials.as_ref()?.0.maps.divided(material)?.size)
+        Some(self.materials.as_ref()?.maps.divided(material)?.size)
     }
 
     /// GPU times of the last [`Self::record_materials`], which has run; `None` without timestamps.

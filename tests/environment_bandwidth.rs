@@ -24,16 +24,7 @@ fn on_device(map: &LatLong, eps: f64) -> (Vec<f32>, usize) {
     let model = Model::Ggx(Ggx { alpha: 0.5, f0: DVec3::ONE, albedo: DVec3::ZERO });
     let materials = vec![Material { name: "any".into(), model, maps: Default::default() }];
     let environment = Some(EnvironmentLight { map: map.clone(), intensity: 1.0, rotation: 0.0, visible: false });
-    let world = World {
-        name: "bandwidth".into(),
-        camera,
-        size: None,
-        environment,
-        objects: Vec::new(),
-        materials,
-        lights: Vec::new(),
-        shadows: None,
-    };
+    let world = World { environment, materials, ..World::empty("bandwidth", camera) };
     let mut session = Session::new(headless, &world, &config).unwrap();
     let (bytes, _, [width, _]) = session.image("environment bandwidth").unwrap();
     assert_eq!(session.messages(), Vec::<String>::new());

@@ -29,16 +29,7 @@ fn session(models: &[Model]) -> Session {
         .map(|(i, m)| Material { name: i.to_string(), model: m.clone(), maps: Default::default() })
         .collect();
     let camera = Camera { position: DVec3::Z, target: DVec3::ZERO, up: DVec3::Y, fov_y: 40.0 };
-    let world = World {
-        name: "probe".into(),
-        camera,
-        size: None,
-        environment: None,
-        lights: vec![],
-        shadows: None,
-        objects: vec![],
-        materials,
-    };
+    let world = World { materials, ..World::empty("probe", camera) };
     let config = Config::new([8, 8]);
     let options = Options { device: Some(DEVICE.into()), validate: true };
     let headless = Headless::new(&options, &Requirements::of(&config)).unwrap();

@@ -23,6 +23,7 @@ mod mesh_buffers;
 pub mod metrics;
 mod model_key;
 mod prepared;
+mod probe;
 pub mod progress;
 pub mod rates;
 mod read_back;

@@ -2,27 +2,22 @@
 
 use crate::distribution::{LobeFit, chart};
 use crate::gpu::access::Access;
-use crate::gpu::buffer::Buffer;
 use crate::gpu::image::{Image, ImageDesc};
-use crate::gpu::memory::Location;
-use crate::gpu::pipeline::{BridgeLayouts, Modules};
 use crate::gpu::recorder::{Recorder, States};
 use crate::gpu::retire::{Build, Retired};
 use crate::gpu::timer::FrameTimings;
-use crate::gpu::upload::{BufferUpload, ImageUpload};
+use crate::gpu::upload::ImageUpload;
 use crate::offline::error::{Error, Result};
 use crate::offline::headless::Headless;
 use crate::offline::mesh_buffers::MeshBuffers;
 use crate::offline::prepared::Prepared;
 use crate::offline::progress::Progress;
 pub use crate::offline::read_back::MomentLevels;
-use crate::offline::read_back::copy_buffer;
 use crate::offline::shadows::Shadows;
 use crate::offline::shown::Shown;
 use crate::offline::window::{Window, near};
 use crate::offline::world::World;
-use crate::pass::probe::Probe;
-use crate::pass::{PassContext, brdf_map, cluster_moments, mixtures, vmf_mips};
+use crate::pass::{brdf_map, cluster_moments, mixtures, vmf_mips};
 use crate::plan::Levels;
 use crate::renderer::Renderer;
 use crate::sampling::LatLong;
@@ -46,7 +41,7 @@ pub struct Session {
     pub(super) materials: Vec<Material>,
     /// By the address of the mesh.
     meshes: HashMap<usize, MeshBuffers>,
-    shown: Shown,
+    pub(super) shown: Shown,
     setup: SetupTimes,
     material_bytes: u64,
     record_ms: f64,
@@ -297,52 +292,6 @@ impl Session {
             Ok(bag)
         })?;
         fresh.ok_or_else(closed)
-    }
-
-    /// Runs a compute module of the caller's own over the session's materials and environment: local size 64, set 1 the
-    /// material bridge, set 2 the frame uniform, the environment's map and intervals, `uvec4` input and `vec4` output; a
-    /// push constant holds the number of entries. Entry i of the result is output i.
-    ///
-    /// # Errors
-    /// [`crate::Error::Shader`] for words that are no SPIR-V; the device's.
-    pub fn probe(&mut self, words: &[u32], input: &[[u32; 4]]) -> Result<Vec<[f32; 4]>> {
-        let inputs = self.shown.inputs([0, 0]);
-        let renderer = self.renderer.as_mut().ok_or_else(closed)?;
-        let mut modules = Modules::default();
-        modules.replace("probe.comp", words.to_vec());
-        let mut made = None;
-        self.headless.submit(|cmd, memory| {
-            let bridge = BridgeLayouts { gbuffer: vk::DescriptorSetLayout::null(), materials: renderer.material_layout() };
-            let bytes: &[u8] = bytemuck::cast_slice(input);
-            let (probe, upload, output) = Build::run(renderer.context(), memory, |build| {
-                let usage = vk::BufferUsageFlags::STORAGE_BUFFER;
-                let upload = BufferUpload::new(build, "probe input", usage, bytes)?;
-                let source = usage | vk::BufferUsageFlags::TRANSFER_SRC;
-                let output = Buffer::new(build, "probe output", bytes.len() as u64, source, Location::Device)?;
-                Ok((Probe::new(&mut PassContext { build, modules: &modules, bridge, slots: 1 })?, upload, output))
-            })?;
-            let mut bag = Retired::default();
-            let mut fresh = None;
-            renderer.copy_out(cmd, |_, rec| fresh = Some(upload.record(rec, &mut bag)));
-            let input_buffer = fresh.ok_or_else(closed)?;
-            renderer.record_probe(cmd, &inputs, &probe, (&input_buffer, input.len() as u32, &output))?;
-            made = Some((probe, input_buffer, output));
-            Ok(bag)
-        })?;
-        let (probe, input_buffer, output) = made.ok_or_else(closed)?;
-        let result = self.read(output.size, |_, rec, target| copy_buffer(rec, &output, target));
-        let mut bag = Retired::default();
-        if let Some(renderer) = self.renderer.as_mut() {
-            renderer.forget(&input_buffer);
-            renderer.forget(&output);
-        }
-        probe.retire(&mut bag);
-        input_buffer.retire(&mut bag);
-        output.retire(&mut bag);
-        let (host, memory) = self.headless.parts()?;
-        // SAFETY: every submission was waited for.
-        unsafe { bag.free(host.device, memory) };
-        Ok(bytemuck::pod_collect_to_vec(&result?))
     }
 
     /// GPU times of the frame before the last.

@@ -114,3 +114,19 @@ pub struct World {
     /// Materials, indexed by the objects.
     pub materials: Vec<Material>,
 }
+
+impl World {
+    /// Nothing but a camera.
+    pub fn empty(name: &str, camera: Camera) -> Self {
+        Self {
+            name: name.into(),
+            camera,
+            size: None,
+            environment: None,
+            lights: Vec::new(),
+            shadows: None,
+            objects: Vec::new(),
+            materials: Vec::new(),
+        }
+    }
+}

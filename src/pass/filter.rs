@@ -61,10 +61,7 @@ pub(crate) struct Io<'a> {
 }
 
 /// Compiled for the classes that a set of materials uses, and the most clusters of one.
-pub(crate) struct Filter {
-    pipeline: ComputePipeline,
-    made_for: (Uses, u32),
-}
+pub(crate) struct Filter(ComputePipeline);
 
 impl Filter {
     /// `clusters` is the most that a material has, at least 1.
@@ -81,13 +78,7 @@ impl Filter {
         let lobes = [brdf_map::number(filter), filter.lobe_layers()].into_iter().chain(read);
         let constants = [albedo, specular, normal, roughness, geometric, moments, cells];
         let constants: Vec<_> = constants.into_iter().chain(lobes).collect();
-        let pipeline = ComputePipeline::new(p.build, p.modules, &INTERFACE, p.bridge, p.slots, &constants)?;
-        Ok(Self { pipeline, made_for: (uses, clusters) })
-    }
-
-    /// Whether it would be the same for these.
-    pub fn suits(&self, uses: Uses, clusters: u32) -> bool {
-        self.made_for == (uses, clusters)
+        Ok(Self(ComputePipeline::new(p.build, p.modules, &INTERFACE, p.bridge, p.slots, &constants)?))
     }
 
     pub fn record(&self, rec: &mut Recorder<'_>, io: &Io<'_>) {
@@ -105,12 +96,12 @@ impl Filter {
         resources.extend([io.normals, io.factors, io.lobes].map(|image| Resource::Storage(image.view)));
         resources.push(Resource::Buffer(io.objects.map_or(io.maps.records(), ObjectCells::table)));
         resources.push(Resource::Buffer(io.maps.clusters()));
-        self.pipeline.bind(rec, io.bridge, &resources, &());
-        self.pipeline.dispatch(rec, io.normals.extent());
+        self.0.bind(rec, io.bridge, &resources, &());
+        self.0.dispatch(rec, io.normals.extent());
         rec.end();
     }
 
     pub fn retire(self, bag: &mut Retired) {
-        self.pipeline.retire(bag);
+        self.0.retire(bag);
     }
 }

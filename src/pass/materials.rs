@@ -15,7 +15,7 @@ use crate::gpu::upload::{BufferUpload, ImageUpload};
 use crate::kinds::Kinds;
 use crate::material::{MOST_KERNEL, Material};
 use crate::pass::fits::{self, Packed};
-use crate::pass::maps::{MapImages, MapsUpload, MomentWork, Reading, Uses};
+use crate::pass::maps::{MapImages, MapsUpload, MomentWork, Reading};
 use crate::reflectance::ladder::{Ladder, own_square};
 use crate::reflectance::merl::{PHI_DIFF, THETA_DIFF, THETA_HALF};
 use crate::reflectance::{Lobe, MerlTable, Model, atlas, bandwidth};
@@ -251,8 +251,7 @@ impl MaterialsUpload {
         let packed_fits = Packed::of(&fits);
         records.iter_mut().zip(&packed_fits.firsts).for_each(|(record, first)| record.kind[3] = *first);
         let models = materials.iter().fold(0, |bits, m| bits | 1 << number(&m.model));
-        let kinds =
-            Kinds::of(materials, &maps.found, &packed_fits, reading.filter, if estimator.looks_up() { models } else { 0 });
+        let kinds = Kinds::of(materials, &maps, &packed_fits, reading.filter, if estimator.looks_up() { models } else { 0 });
         let storage = vk::BufferUsageFlags::STORAGE_BUFFER;
         let fit_upload = estimator
             .looks_up()
@@ -287,16 +286,6 @@ impl MaterialsUpload {
             fitted: fits,
             kinds,
         })
-    }
-
-    /// Classes that hold maps of each kind.
-    pub fn uses(&self) -> Uses {
-        self.maps.uses
-    }
-
-    /// The most clusters that a material has, at least 1.
-    pub fn most_clusters(&self) -> u32 {
-        self.maps.most_clusters
     }
 
     /// The sets of the passes over the maps, which run after [`Self::record`].

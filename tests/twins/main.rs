@@ -51,16 +51,7 @@ impl Device {
         let camera = Camera { position: DVec3::Z, target: DVec3::ZERO, up: DVec3::Y, fov_y: 40.0 };
         let material = |(i, model): (usize, Model)| Material { name: i.to_string(), model, maps: Default::default() };
         let materials = models.into_iter().enumerate().map(material).collect();
-        let world = World {
-            name: "twins".into(),
-            camera,
-            size: None,
-            environment,
-            objects: Vec::new(),
-            materials,
-            lights: Vec::new(),
-            shadows: None,
-        };
+        let world = World { environment, materials, ..World::empty("twins", camera) };
         Self(Session::new(headless, &world, &config).unwrap_or_else(|e| panic!("{e}")))
     }
 

@@ -158,9 +158,7 @@ impl Args {
             cache: reference::cache_folder(),
         })
     }
-}
 
-impl Args {
     /// Keeps what was found so far, if that is asked for.
     fn write(&self, report: &impl serde::Serialize) -> Result<()> {
         let Some(path) = &self.json else { return Ok(()) };

@@ -200,6 +200,12 @@ impl Stage<'_> {
         Config { frames_in_flight: 1, filter, extent, estimator, directions, anisotropy, ..self.config.clone() }
     }
 
+    /// A session in which light is looked up, which some materials refuse.
+    fn looked_up(&self, filter: Filter, extent: [u32; 2]) -> Result<Option<Session>> {
+        let config = Config { estimator: Estimator::Preconvolved, ..self.config(filter, extent, 1) };
+        Ok(open(&self.world, &config, self.device())?.ok())
+    }
+
     /// `made` is what making maps took under the scene's other light, if that was measured.
     fn measure(
         &self,

@@ -9,7 +9,7 @@ use crate::offline::bench::xu::{Stage, finite, open};
 use crate::offline::error::Result;
 use crate::offline::metrics::Picture;
 use crate::offline::session::Session;
-use crate::{Config, Estimator, Filter};
+use crate::{Config, Filter};
 
 /// Directions of one frame under an environment; frames are added until their noise is low.
 const DIRECTIONS: u32 = 256;
@@ -56,23 +56,23 @@ pub(super) fn take(
     let reference = (truth.image().picture, mask(truth));
     let (mut stills, mut kept) = (Vec::new(), Vec::new());
     for (done, (filter, row)) in (1..).zip(stage.order.filters.iter().copied().zip(rows.iter_mut())) {
-        let drawing = stage.config(filter, stage.config.extent, DIRECTIONS);
-        let looking_up = Config { estimator: Estimator::Preconvolved, ..drawing.clone() };
+        let config = stage.config(filter, stage.config.extent, DIRECTIONS);
         // Of points the same is summed exactly by all.
-        let mut looked_up = open(&stage.world, &looking_up, stage.device())?.ok();
+        let mut looked_up = stage.looked_up(filter, stage.config.extent)?;
         let shared = if stage.light == Light::Point { looked_up.take() } else { None };
-        let (config, drawn) = match shared {
-            Some(session) => (&looking_up, Ok(session)),
-            None => (&drawing, open(&stage.world, &drawing, stage.device())?),
+        let shares = shared.is_some();
+        let drawn = match shared {
+            Some(session) => Ok(session),
+            None => open(&stage.world, &config, stage.device())?,
         };
         match drawn {
             Ok(mut session) => {
                 let (picture, frames, noise) = average(stage, filter, &mut session, (&reference.0, &reference.1))?;
-                row.lobes = lobes(&mut session, config)?;
+                row.lobes = lobes(&mut session, &config)?;
                 let preconvolved = looked_up.as_mut().map(frame).transpose()?;
                 let directions = if stage.light == Light::Point { 0 } else { frames * DIRECTIONS };
                 stills.push(Still { filter, picture, preconvolved, directions, noise });
-                let looks_up = looked_up.is_some() || config.estimator == Estimator::Preconvolved;
+                let looks_up = shares || looked_up.is_some();
                 kept.push(Kept { filter, session: looked_up.unwrap_or(session), looks_up });
             }
             Err(reason) => row.refused = Some(reason),

@@ -1,6 +1,7 @@
 //! A scene's own camera motion, frame by frame: how errors change between consecutive frames, and how the sequence looks beside its
 //! truth (Tan et al. 2005, figure 4).
 
+use crate::Filter;
 use crate::offline::animation::AnimatedWorld;
 use crate::offline::bench::quality::Frame;
 use crate::offline::bench::reference::Goal;
@@ -13,7 +14,6 @@ use crate::offline::error::Result;
 use crate::offline::metrics::{Exposure, Pair, Picture, compare};
 use crate::offline::session::Session;
 use crate::offline::world::Camera;
-use crate::{Config, Estimator, Filter};
 use std::time::Instant;
 
 /// Those that are compared, if they are ordered.
@@ -114,18 +114,14 @@ pub(super) fn measure(
     Ok(Zoom { scene, light: stage.light, extent, frames: cameras.len(), samples: samples.into(), noise, noise_jod, rows })
 }
 
-/// A session for the frames of one filter, or why there is none; and whether anything is drawn in them: under an environment light is looked up,
+/// A session for the frames of one filter, or why there is none; and whether anything is drawn in them: light is looked up,
 /// unless a material refuses that.
 fn moving(stage: &Stage<'_>, filter: Filter, extent: [u32; 2]) -> Result<(std::result::Result<Session, String>, bool)> {
-    let drawing = stage.config(filter, extent, DIRECTIONS);
-    if stage.light == Light::Environment {
-        let looking_up = Config { estimator: Estimator::Preconvolved, ..drawing.clone() };
-        if let Ok(session) = open(&stage.world, &looking_up, stage.device())? {
-            return Ok((Ok(session), filter.is_random()));
-        }
+    if let Some(session) = stage.looked_up(filter, extent)? {
+        return Ok((Ok(session), filter.is_random()));
     }
     let drawn = filter.is_random() || stage.light == Light::Environment;
-    Ok((open(&stage.world, &drawing, stage.device())?, drawn))
+    Ok((open(&stage.world, &stage.config(filter, extent, DIRECTIONS), stage.device())?, drawn))
 }
 
 /// The frames of one filter, or why there are none.
