@@ -41,7 +41,7 @@ layout(set = 2, binding = 6) uniform sampler2D lobe_bandwidths;       // cycles/
 layout(set = 2, binding = 7, r32ui) uniform writeonly uimage2D level; // of each sample, in levels over a sample
 layout(set = 2, binding = 8, rgba16f) uniform writeonly image2D prediction; // of each block: cycles/sample; standard deviation of the
                                                                            // integrand over its mean; logarithm of the weight
-                                                                           // by which directions are shared out
+                                                                           // by which directions are shared out; 1
 layout(set = 2, binding = 9, std430) readonly buffer Lights {
     LightRecord lights[]; // exact ones first
 };
@@ -176,7 +176,7 @@ int predict(uint entry) {
         weight = mean > 0.0 ? sqrt(variance + chance * chance) / (s.weights / float(push.probes) + push.dark) : 0.0;
     }
     float log_weight = ALLOCATION == ALLOCATION_CONSTANT ? 0.0 : allocation_log(weight);
-    imageStore(prediction, block, vec4(min(b, 6e4), min(mean > 0.0 ? sqrt(variance) / mean : 0.0, 6e4), log_weight, 0.0));
+    imageStore(prediction, block, vec4(min(b, 6e4), min(mean > 0.0 ? sqrt(variance) / mean : 0.0, 6e4), log_weight, 1.0));
     for (k = 0; k < push.side * push.side; ++k) {
         ivec2 p = first + ivec2(k % push.side, k / push.side);
         if (all(lessThan(p, extent))) {

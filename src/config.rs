@@ -9,6 +9,7 @@ use crate::frequency::environment::EPS;
 use crate::frequency::luminance::COARSEST;
 use crate::frequency::operators::{Combine, Operator};
 use crate::gpu::pipeline::Modules;
+use crate::reflectance::bandwidth;
 use ash::vk;
 
 /// How directions are drawn and combined at a shaded sample.
@@ -158,6 +159,10 @@ pub struct Config {
     /// Details below this share of the largest do not count in the analyses of environment, lobes and textures
     /// ([`crate::frequency::wavelet`]): 0.001 to 0.1.
     pub eps: f64,
+    /// Principal components that are kept, beside their mean, of the tiles that say how fast lobes vary (Bagher 2011, section 2.4 and figure 8), 0
+    /// to 16; the tiles as they are if `None`. They are stored whole in either case: it is a study of what compression costs
+    /// ([`crate::reflectance::LobeBandwidth::compressed`] has its error).
+    pub lobe_components: Option<u32>,
     /// How materials are read.
     pub filter: Filter,
     /// Where filters with cells have these. [`Bins::Camera`] asks for such a filter, and for draws.
@@ -218,6 +223,7 @@ impl Config {
             operator: Operator::default(),
             combine: Combine::default(),
             eps: EPS,
+            lobe_components: None,
             filter: Filter::default(),
             bins: Bins::default(),
             anisotropy: 1,
@@ -350,6 +356,8 @@ impl Config {
             check(inside, "division", "two lengths above 0 and below 1", format!("{lengths:?}"))?;
         }
         check((1e-3..=0.1).contains(&self.eps), "eps", "0.001 to 0.1", self.eps.to_string())?;
+        let (components, tiles) = (self.lobe_components.unwrap_or(0), bandwidth::SIDE as u32);
+        check(components <= tiles, "lobe_components", &format!("0 to {tiles}"), components.to_string())?;
         let rate = self.samples_per_cycle.unwrap_or(1.0);
         check(rate > 0.0 && rate.is_finite(), "samples_per_cycle", "a finite number > 0", rate.to_string())?;
         let least = if self.estimator.combines() { 2 } else { 1 };

@@ -12,7 +12,7 @@ use crate::material::Material;
 use crate::pass::environment::{Analyses, EnvironmentUpload};
 use crate::pass::gbuffer::{self, Draw};
 use crate::pass::maps::Reading;
-use crate::pass::materials::{MaterialsUpload, Uploading};
+use crate::pass::materials::{Analysis, MaterialsUpload, Uploading};
 use crate::pass::object_cells::{ObjectCells, Seats};
 use crate::pass::{PassContext, brdf_map, cluster_moments, mixtures, vmf_mips};
 use crate::passes::layout;
@@ -72,12 +72,13 @@ impl Renderer {
         let (modules, slots, widened) = (&config.modules, config.frames_in_flight, config.widened());
         let (filter, bins) = (self.config.filter, self.config.bins);
         let (passes, samplers) = (self.passes.moments.as_ref(), &self.samplers);
-        let (eps, estimator) = (config.predicts().then_some(config.eps), config.estimator);
+        let analysis = Analysis { eps: config.eps, lobe_components: config.lobe_components };
+        let (analysis, estimator) = (config.predicts().then_some(analysis), config.estimator);
         let budget = config.fit_budget();
         let kept = self.of_kinds.as_ref().map(|passes| passes.kinds);
         let (mut upload, of_kinds) = Build::run(&self.cx, memory, |build| {
             let reading = Reading { filter, bins, rule, widened, passes, samplers };
-            let upload = MaterialsUpload::new(build, materials, &Uploading { reading, eps, estimator, budget })?;
+            let upload = MaterialsUpload::new(build, materials, &Uploading { reading, analysis, estimator, budget })?;
             let mut p = PassContext { build, modules, bridge, slots };
             let fresh = kept != Some(upload.kinds);
             let of_kinds = fresh.then(|| OfKinds::new(&mut p, config, upload.kinds)).transpose()?;

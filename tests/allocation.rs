@@ -38,11 +38,19 @@ type Entries<T> = Vec<(u32, T)>;
 /// Entries of the list with their logarithmic weights, as the device has them, and what it gave to whom.
 fn shared(session: &mut Session, config: &Config) -> (Entries<f64>, Entries<u32>) {
     let count = session.shaded().unwrap() as usize;
-    let (weights, [columns, _]) = texels(session, "prediction");
+    let (weights, [columns, rows]) = texels(session, "prediction");
     let side = 2 * config.samples_per_side as usize;
+    // The most of the blocks that the sample's cell reaches into.
     let weight = |entry: u32| {
-        let [x, y] = [entry & 0x3fff, entry >> 14 & 0x3fff].map(|p| p as usize / side);
-        weights[y * columns + x][2] + config.allocation.by_level() * f64::from(entry >> 28)
+        let level = entry >> 28;
+        let reached = |p: u32, blocks: usize| {
+            let first = (p >> level << level) as usize;
+            first / side..=((first + (1 << level) - 1) / side).min(blocks - 1)
+        };
+        let (x, y) = (reached(entry & 0x3fff, columns), reached(entry >> 14 & 0x3fff, rows));
+        let blocks = y.flat_map(|y| x.clone().map(move |x| y * columns + x));
+        let predicted = blocks.map(|at| weights[at]).filter(|w| w[3] > 0.0);
+        predicted.map(|w| w[2]).fold(NONE, f64::max) + config.allocation.by_level() * f64::from(level)
     };
     let mut list: Vec<_> = session.words("list").unwrap()[..count].iter().map(|e| (*e, weight(*e))).collect();
     let mut allocated: Vec<_> =

@@ -279,6 +279,25 @@ fn the_threshold_matters_little() {
     }
 }
 
+/// Of the share of samples that get another level where lobes' bandwidths are kept as so many principal components.
+#[test]
+fn a_few_components_of_the_lobes_are_enough() {
+    for material in ["metallic-paint", "rough"] {
+        let knot = world("torus-knot", 256, table(material), sky("sun-sky"));
+        let [whole, all, some, none] = [None, Some(16), Some(4), Some(0)].map(|lobe_components| {
+            let mut session = session(&knot, &Config { curvature: true, lobe_components, ..predicted([160, 160], 16) });
+            session.frame([1, 0]).unwrap();
+            Frame::read(&mut session)
+        });
+        let covered = whole.ids.iter().filter(|id| **id != 0).count() as f64;
+        let changed = [&all, &some, &none]
+            .map(|other| whole.levels.iter().zip(&other.levels).filter(|(a, b)| a != b).count() as f64 / covered);
+        println!("{material}: another level with all, 4, 0 components: {changed:.4?}");
+        let [all, some, none] = changed;
+        assert!(all < 1e-3 && some < 0.02 && some < none, "{material}: {changed:?}");
+    }
+}
+
 #[test]
 fn textures_ask_for_finer_levels() {
     let config = Config { lmax: 5, ..predicted([160, 120], 64) };

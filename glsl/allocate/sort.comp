@@ -34,7 +34,7 @@ void main() {
     uint index = list_index();
     if (index < arguments.count) {
         uint entry = list[index];
-        float log_weight = texelFetch(prediction, list_sample(entry) / push.side, 0).z + push.by_level * float(list_level(entry));
+        float log_weight = allocation_weight(prediction, entry, push.side, push.by_level);
         uint bin = allocation_bin(log_weight, entry);
         Share share = shares[bin];
         allocated[share.first + atomicAdd(cursors[bin], 1u)] =

@@ -2,6 +2,7 @@
 // logarithms to base 2 the bandwidth pass writes. src/frequency/allocation.rs is the f64 twin.
 #ifndef ALLOCATION_GLSL
 #define ALLOCATION_GLSL
+#include "list.glsl"
 #include "sobol.glsl"
 
 const int ALLOCATION_CONSTANT = 0;
@@ -24,6 +25,22 @@ struct Share {
 
 float allocation_log(float weight) {
     return weight > 0.0 ? clamp(log2(weight), ALLOCATION_NONE, -ALLOCATION_NONE) : ALLOCATION_NONE;
+}
+
+// Logarithm of the weight of a sample by its entry in the list: the most of any block under the cell that it stands for (Bagher's
+// section 3.1). `prediction` is as the bandwidth pass writes it, `side` a block's in samples.
+float allocation_weight(sampler2D prediction, uint entry, int side, float by_level) {
+    int l = list_level(entry);
+    ivec2 cell = list_sample(entry) >> l << l, first = cell / side, last = (cell + (1 << l) - 1) / side;
+    last = min(last, textureSize(prediction, 0) - 1);
+    float most = ALLOCATION_NONE;
+    for (int y = first.y; y <= last.y; ++y) {
+        for (int x = first.x; x <= last.x; ++x) {
+            vec4 found = texelFetch(prediction, ivec2(x, y), 0);
+            most = max(most, found.w > 0.0 ? found.z : ALLOCATION_NONE);
+        }
+    }
+    return most + by_level * float(l);
 }
 
 // Of a sample by its entry in the list.

@@ -254,6 +254,7 @@ pub(super) fn report(
         ("operator", json!(format!("{:?}", config.operator).to_lowercase())),
         ("combine", json!(format!("{:?}", config.combine).to_lowercase())),
         ("eps", json!(config.eps)),
+        ("lobe_components", json!(config.lobe_components)),
         ("geometric", json!(config.geometric)),
         ("estimator", json!(config.estimator.name())),
         ("reflectance_share", json!(config.reflectance_share)),

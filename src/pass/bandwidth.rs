@@ -108,7 +108,7 @@ pub(crate) fn list_bytes(extent: [u32; 2]) -> u64 {
 /// What the pass writes beside levels.
 pub(crate) struct Prediction {
     /// Of each block: bandwidth in cycles/sample, the integrand's relative standard deviation and the logarithm to base 2 of the
-    /// weight by which directions are shared out; 0 where all samples are shaded alike.
+    /// weight by which directions are shared out, 0 where all samples are shaded alike; 1. All 0 where nothing is predicted.
     pub image: Image,
     /// Which of the next passes run.
     pub forecast: Buffer,

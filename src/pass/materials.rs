@@ -86,11 +86,20 @@ pub(crate) struct MaterialsUpload {
 pub(crate) struct Uploading<'a> {
     /// How maps are read.
     pub reading: Reading<'a>,
-    /// At which threshold bandwidths are analysed, if the frame predicts it.
-    pub eps: Option<f64>,
+    /// How bandwidths are analysed, if the frame predicts it.
+    pub analysis: Option<Analysis>,
     pub estimator: Estimator,
     /// Of fits that are not there yet.
     pub budget: Budget,
+}
+
+/// How the bandwidths of lobes and textures are found.
+#[derive(Clone, Copy)]
+pub(crate) struct Analysis {
+    /// Details below this share of the largest do not count.
+    pub eps: f64,
+    /// As [`crate::Config::lobe_components`].
+    pub lobe_components: Option<u32>,
 }
 
 /// What the prediction of bandwidth knows of the materials.
@@ -201,11 +210,11 @@ fn bandwidths(
     build: &mut Build<'_>,
     materials: &[Material],
     records: &mut [Record],
-    eps: f64,
+    Analysis { eps, lobe_components }: Analysis,
 ) -> Result<(ImageUpload, BufferUpload)> {
     let extent = [bandwidth::WIDTH as u32, (bandwidth::SIDE * materials.len()) as u32, 1];
     let desc = ImageDesc::new("lobe bandwidth", vk::Format::R32_SFLOAT, extent, vk::ImageUsageFlags::SAMPLED);
-    let lobes = ImageUpload::new(build, desc, bytemuck::cast_slice(&atlas::lobe_bandwidths(materials, eps)))?;
+    let lobes = ImageUpload::new(build, desc, bytemuck::cast_slice(&atlas::lobe_bandwidths(materials, eps, lobe_components)))?;
     let mut cells = vec![0.0f32];
     for (material, record) in materials.iter().zip(records) {
         let [u, v] = material.maps.tiling;
@@ -222,7 +231,7 @@ fn bandwidths(
 
 impl MaterialsUpload {
     pub fn new(build: &mut Build<'_>, materials: &[Material], io: &Uploading<'_>) -> Result<Self> {
-        let Uploading { reading, eps, estimator, budget } = io;
+        let Uploading { reading, analysis, estimator, budget } = io;
         if materials.is_empty() || materials.len() > MAX_MATERIALS {
             return Err(Error::invalid("materials", format!("1 to {MAX_MATERIALS}"), materials.len()));
         }
@@ -257,7 +266,7 @@ impl MaterialsUpload {
             .looks_up()
             .then(|| BufferUpload::new(build, "lobe fits", storage, bytemuck::cast_slice(&packed_fits.words)))
             .transpose()?;
-        let bandwidths = eps.map(|eps| bandwidths(build, materials, &mut records, eps)).transpose()?;
+        let bandwidths = analysis.map(|analysis| bandwidths(build, materials, &mut records, analysis)).transpose()?;
         let left: Vec<_> = fits.iter().map(|fit| fit.as_deref().filter(|_| estimator.has_residual())).collect();
         let importance = atlas::importance_tables(materials, &ladders, &left);
         let image = |name, format, extent| ImageDesc::new(name, format, extent, vk::ImageUsageFlags::SAMPLED);

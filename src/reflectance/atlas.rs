@@ -30,14 +30,17 @@ pub fn importance_tables(materials: &[Material], ladders: &[Ladder], fits: &[Opt
 }
 
 /// The lobes' bandwidths of all materials, one strip below the other; a table that several share is analysed
-/// once, at threshold `eps`.
-pub fn lobe_bandwidths(materials: &[Material], eps: f64) -> Vec<f32> {
+/// once, at threshold `eps`. With [`crate::Config::lobe_components`].
+pub fn lobe_bandwidths(materials: &[Material], eps: f64, components: Option<u32>) -> Vec<f32> {
     let mut built: Vec<(&Model, Arc<LobeBandwidth>)> = Vec::new();
     let mut texels = Vec::with_capacity(materials.len() * bandwidth::WIDTH * bandwidth::SIDE);
     for Material { model, lobe_bandwidth, .. } in materials {
         let shared = built.iter().find(|(known, _)| same_table(known, model)).map(|(_, lobes)| lobes);
         let lobes = lobe_bandwidth.as_ref().or(shared).map_or_else(|| Arc::new(LobeBandwidth::build(model, eps)), Arc::clone);
-        texels.extend_from_slice(lobes.texels());
+        match components {
+            Some(kept) => texels.extend_from_slice(lobes.compressed(kept as usize).0.texels()),
+            None => texels.extend_from_slice(lobes.texels()),
+        }
         built.push((model, lobes));
     }
     texels

@@ -78,8 +78,7 @@ impl LobeBandwidth {
     }
 
     /// The strip from the mean of the tiles and their first `components` principal components (section 2.4, figure 8), and its
-    /// error: the root of the squared differences over that of the squared values. A study: strips are so small (16 KiB) that
-    /// nothing keeps or reads them in this form.
+    /// error: the root of the squared differences over that of the squared values.
     pub fn compressed(&self, components: usize) -> (Self, f64) {
         let tile = |angle: usize| move |i: usize| (i / SIDE) * WIDTH + angle * SIDE + i % SIDE;
         let all: Vec<Vec<f64>> = (0..SIDE).map(|a| (0..WIDTH).map(|i| f64::from(self.texels[tile(a)(i)])).collect()).collect();

@@ -265,6 +265,7 @@ pub(super) struct Settings {
     pub operator: Key<String>,
     pub combine: Key<String>,
     pub eps: Key<f64>,
+    pub lobe_components: Key<u32>,
     pub np_rule: Key<String>,
     pub budget: Key<u32>,
     pub lmax: Key<u32>,

@@ -115,6 +115,7 @@ impl Scene {
                 _ => base.combine,
             },
             eps: settings.eps.as_ref().map_or(base.eps, |v| *v.get_ref()),
+            lobe_components: settings.lobe_components.as_ref().map_or(base.lobe_components, |v| Some(*v.get_ref())),
             bins: match settings.bins.as_ref().map(|v| v.get_ref().as_str()) {
                 Some("camera") => Bins::Camera,
                 _ => base.bins,

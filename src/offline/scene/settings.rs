@@ -11,6 +11,9 @@ impl Check<'_> {
         self.each(&s.np_rule, |c, v| c.name(v, &["constant", "eq8", "sqrt", "relstd"]))?;
         self.each(&s.bins, |c, v| c.name(v, &["camera", "tangent"]))?;
         self.each(&s.eps, |c, v| c.number(v, "0.001 to 0.1", |v| (1e-3..=0.1).contains(&v)))?;
+        self.each(&s.lobe_components, |c, v| {
+            c.require(*v.get_ref() <= 16, &v.span(), "a whole number from 0 to 16", v.get_ref())
+        })?;
         for threshold in [&s.eps0, &s.eps1] {
             self.each(threshold, |c, v| c.number(v, "0 < threshold < 1", |v| v > 0.0 && v < 1.0))?;
         }
