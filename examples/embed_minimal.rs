@@ -132,6 +132,7 @@ pub fn run(options: &Options) -> Result<Report, Box<dyn Error>> {
                 lights: &[],
                 shadows: None,
                 levels: None,
+                shading_rate: None,
                 seed: [0, 0],
                 output: Some(Output { image: output, transfer: Transfer::Srgb { exposure: 0.5 } }),
             };

@@ -1,7 +1,8 @@
 #version 460
 // Image bandwidth and level of every block of samples (Bagher 2011, sections 2.1 to 2.3, equations 3, 4 and 9, as corrected in
 // src/frequency): a few directions drawn from the reflectance tell how fast light and lobe vary where light comes from, the
-// surface's curvature and distance how fast that makes the image vary. One sample stands for a block of 2x2 output pixels.
+// surface's curvature and distance how fast that makes the image vary. One sample stands for a block of 2x2 output pixels. Where the
+// filter finds lobes, these are the reflectance: what a pixel covers varies less than what its texels do.
 layout(set = 2, binding = 3) uniform sampler2D normals;  // as the filter pass writes them
 layout(constant_id = 2) const bool KERNEL = false;
 #define MATERIAL_KERNEL KERNEL
@@ -14,6 +15,9 @@ layout(constant_id = 2) const bool KERNEL = false;
 #include "lights.glsl"
 #define SHADOWS_BINDING 13
 #include "shadows.glsl"
+#define LOBES_BINDING 14
+#include "lobes.glsl"
+#include "found_bandwidth.glsl"
 #include "curvature.glsl"
 #include "bandwidth.glsl"
 #include "lobe_bandwidth.glsl"
@@ -34,6 +38,8 @@ const int COMBINE_LITERAL = 2;
 layout(constant_id = 3) const bool LOCAL_LIGHTS = false;
 // What directions are shared out by, in the order of src/frequency/allocation.rs.
 layout(constant_id = 4) const int ALLOCATION = ALLOCATION_CONSTANT;
+// Where the filter finds lobes: whether there are materials beside, which stay as they are.
+layout(constant_id = 10) const uint UNFILTERED = 1u;
 
 layout(set = 2, binding = 4) uniform usampler2D factors;
 layout(set = 2, binding = 5) uniform sampler2D environment_bandwidth; // cycles/radian
@@ -97,6 +103,40 @@ void add(inout Sums s, float bandwidth, float radiance, float reflected, float p
     s.squares += weight * weight;
 }
 
+// What the surface does with light.
+struct Surface {
+    int id;
+    Material material;
+    Lobes lobes;
+    vec3 view;
+};
+
+// Of light from local wi above the horizon, h the half vector.
+struct Reflected {
+    float luminance; // reflectance times the cosine
+    float lobe;      // how fast it varies about wi, in cycles/radian
+    float density;   // per steradian, with which lobes are drawn from
+};
+
+bool lobed(Surface s) {
+    return LOBED != 0u && (s.lobes.count > 0u || UNFILTERED == 0u);
+}
+
+Reflected reflected(Surface s, vec3 wi, vec3 h) {
+    Reflected r = Reflected(0.0, 0.0, 0.0);
+    if (UNFILTERED != 0u) {
+        r.luminance = luminance(material_evaluate(s.material, wi, s.view, h)) * wi.z;
+        r.lobe = texelFetch(lobe_bandwidths, lobe_bandwidth_texel(s.id, wi, s.view), 0).x * s.material.sharpness;
+    }
+    if (LOBED != 0u) {
+        vec4 value = lobes_evaluate(s.material, s.lobes, wi, s.view, h);
+        float found = found_bandwidth(s.material, s.lobes, wi, s.view);
+        bool these = lobed(s);
+        r = Reflected(these ? luminance(value.rgb) : r.luminance, these ? found : r.lobe, value.a);
+    }
+    return r;
+}
+
 // Level of the samples of a block, which it writes unless it forecasts.
 int predict(uint entry) {
     ivec2 block = block_place(entry), first = block * push.side, extent = ivec2(frame.extent.xy);
@@ -110,6 +150,7 @@ int predict(uint entry) {
     uint id = gbuffer_material(at);
     Factors adjusted = factors_unpack(texelFetch(factors, at, 0));
     Material m = material_load(id, f.view.z, tangent_turn(f, tangent_decode(normal.xyz, normal.w)), adjusted);
+    Surface s = Surface(int(id), m, lobes_load(at, f, m), f.view);
 
     vec2 curvatures = principal_curvatures(c);
     float distance = c.depth * ray_length;
@@ -117,27 +158,36 @@ int predict(uint entry) {
     vec2 plane = ((vec2(at) + 0.5) / vec2(extent) * 2.0 - 1.0) * frame.ray.xy + frame.ray.zw;
     float angle = pixel_angle(plane, abs(frame.ray.xy) * 2.0 / vec2(extent));
 
-    Sums s = Sums(0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
+    Sums sums = Sums(0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
     uvec2 seeds = sobol_seeds(hash(uint(block.y) << 16 | uint(block.x)) ^ frame.sampling.x);
     for (int i = 0; i < push.probes; ++i) {
-        vec4 h = material_sample(m, sobol_point(uint(i), seeds));
-        float cos_d = dot(f.view, h.xyz);
-        vec3 wi = h.xyz * (2.0 * cos_d) - f.view;
-        bool above = cos_d > 0.0 && wi.z > 0.0;
+        uvec2 point = sobol_point(uint(i), seeds);
+        vec3 wi = vec3(0.0), h = vec3(0.0, 0.0, 1.0);
+        float per_density = 0.0;
+        if (UNFILTERED != 0u) {
+            vec4 drawn = material_sample(m, point);
+            float cos_d = dot(f.view, drawn.xyz);
+            h = drawn.xyz;
+            wi = cos_d > 0.0 ? h * (2.0 * cos_d) - f.view : wi;
+            per_density = 4.0 * cos_d / drawn.w;
+        }
+        wi = lobed(s) ? lobes_sample(m, s.lobes, f.view, point) : wi;
+        bool above = wi.z > 0.0;
         wi = above ? wi : vec3(0.0, 0.0, 1.0);
-        h.xyz = above ? h.xyz : normalize(f.view + wi);
+        h = above && !lobed(s) ? h : normalize(f.view + wi);
         vec2 uv = latlong_uv(to_world(f, wi));
         uv.x -= frame.environment.x;
         float radiance = luminance(environment_fetch(uv).rgb);
-        float reflectance = luminance(material_evaluate(m, wi, f.view, h.xyz)), reflected = reflectance * wi.z;
+        Reflected r = reflected(s, wi, h);
+        per_density = lobed(s) ? 1.0 / r.density : per_density;
         float light = textureLod(environment_bandwidth, uv, 0.0).x;
-        float lobe = texelFetch(lobe_bandwidths, lobe_bandwidth_texel(int(id), wi, f.view), 0).x * m.sharpness;
-        float b = image_bandwidth(OPERATOR, light, lobe, curvatures, distance, f.view.z, angle);
-        add(s, b, above ? radiance : 0.0, above ? reflected : 0.0, 4.0 * cos_d / h.w);
-        s.bound += above ? (light + lobe) * (radiance * reflectance) * (radiance * reflectance) : 0.0;
+        float b = image_bandwidth(OPERATOR, light, r.lobe, curvatures, distance, f.view.z, angle);
+        add(sums, b, above ? radiance : 0.0, above ? r.luminance : 0.0, per_density);
+        float product = radiance * r.luminance / wi.z;
+        sums.bound += above ? (light + r.lobe) * product * product : 0.0;
     }
-    float mean = s.weights / float(push.probes);
-    float variance = max(s.squares / float(push.probes) - mean * mean, 0.0);
+    float mean = sums.weights / float(push.probes);
+    float variance = max(sums.squares / float(push.probes) - mean * mean, 0.0);
 
     // Lights beside the environment: without extent, which is the safe side for those that have some. From one nearby, light
     // turns along the surface as from a distant one where the surface is curved by half of cos / distance more.
@@ -152,14 +202,13 @@ int predict(uint entry) {
         float radiance = luminance(shadowed(lights[i], at)) * solid;
         bool distant = exact && lights[i].place.w == LIGHT_DIRECTIONAL;
         float nearness = distant ? 0.0 : 1.0 / max(length(lights[i].place.xyz - point), 1e-6);
-        float reflected = luminance(material_evaluate(m, wi, f.view, h)) * wi.z;
-        float lobe = texelFetch(lobe_bandwidths, lobe_bandwidth_texel(int(id), wi, f.view), 0).x * m.sharpness;
-        float b = image_bandwidth(OPERATOR, SHARPEST, lobe, curvatures + 0.5 * wi.z * nearness, distance, f.view.z, angle);
-        add(s, b, above ? radiance : 0.0, above ? reflected : 0.0, float(push.probes));
+        Reflected r = reflected(s, wi, h);
+        float b = image_bandwidth(OPERATOR, SHARPEST, r.lobe, curvatures + 0.5 * wi.z * nearness, distance, f.view.z, angle);
+        add(sums, b, above ? radiance : 0.0, above ? r.luminance : 0.0, float(push.probes));
     }
 
-    float total = COMBINE == COMBINE_MEAN ? s.weights : s.radiance;
-    float b = COMBINE == COMBINE_MAX ? s.greatest : (total > 0.0 ? s.weighted / total : 0.0);
+    float total = COMBINE == COMBINE_MEAN ? sums.weights : sums.radiance;
+    float b = COMBINE == COMBINE_MAX ? sums.greatest : (total > 0.0 ? sums.weighted / total : 0.0);
     // Textures vary over the surface: their mips leave at most half a cycle a sample.
     vec4 footprint = gbuffer_footprint(at);
     float texture_units = sqrt(max(dot(footprint.xy, footprint.xy), dot(footprint.zw, footprint.zw)));
@@ -170,10 +219,10 @@ int predict(uint entry) {
     if (push.early == 1u) {
         return found;
     }
-    float weight = ALLOCATION == ALLOCATION_EQUATION8 ? s.bound : sqrt(variance);
+    float weight = ALLOCATION == ALLOCATION_EQUATION8 ? sums.bound : sqrt(variance);
     if (ALLOCATION == ALLOCATION_RELATIVE) {
         float chance = ALLOCATION_CHANCE * mean;
-        weight = mean > 0.0 ? sqrt(variance + chance * chance) / (s.weights / float(push.probes) + push.dark) : 0.0;
+        weight = mean > 0.0 ? sqrt(variance + chance * chance) / (sums.weights / float(push.probes) + push.dark) : 0.0;
     }
     float log_weight = ALLOCATION == ALLOCATION_CONSTANT ? 0.0 : allocation_log(weight);
     imageStore(prediction, block, vec4(min(b, 6e4), min(mean > 0.0 ? sqrt(variance) / mean : 0.0, 6e4), log_weight, 1.0));

@@ -71,7 +71,7 @@ impl Estimator {
 /// Where samples are shaded. Levels are of output pixels: 0 is a pixel, +1 is 2x2 coarser; the samples of a pixel are at
 /// negative ones. Every sample that is not shaded is up-sampled from coarser cells. A host with its own bridge replaces the
 /// modules `pyramid.comp` and `classify.levels.comp` too, unless the rate is full, and for [`Rate::Bandwidth`] also
-/// `bandwidth.blocks.comp` and `bandwidth.comp`.
+/// `bandwidth.blocks.comp` and `bandwidth.comp`; for [`Config::shading_rate`] `shading_rate.comp`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Rate {
     /// Every sample.
@@ -112,6 +112,15 @@ impl Bins {
             Self::Camera => "camera",
         }
     }
+}
+
+/// The level of shading as an attachment of `VK_KHR_fragment_shading_rate`, for hosts that shade with the hardware's rate.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ShadingRate {
+    /// Pixels that a texel stands for, powers of two from 4 to 64: within the device's minimum and maximum.
+    pub texel: [u32; 2],
+    /// The coarsest rate that is asked for: 0 is a pixel; 1 is 2x2, which every device with the extension has; 2 is 4x4.
+    pub coarsest: u32,
 }
 
 /// Where the G-buffer comes from.
@@ -197,6 +206,8 @@ pub struct Config {
     /// How shaded samples share them. All but [`Allocation::Constant`] need [`Rate::Bandwidth`], whose prediction they go by, and
     /// levels above a sample; `directions` is the mean then.
     pub allocation: Allocation,
+    /// Whether and how levels are written for hardware that shades by them. Needs a rate that has levels.
+    pub shading_rate: Option<ShadingRate>,
     /// Whether the curvature pass runs (an output of its own until something in the frame reads it).
     pub curvature: bool,
     /// Whether the renderer's own G-buffer holds texture coordinates, their derivatives and tangents also where no material depends
@@ -238,6 +249,7 @@ impl Config {
             residual_errors: RESIDUAL_ERRORS,
             exact_lobes: false,
             allocation: Allocation::default(),
+            shading_rate: None,
             curvature: false,
             coordinates: false,
             gbuffer: GBufferSource::default(),
@@ -367,6 +379,17 @@ impl Config {
             &format!("{least} to 65536"),
             self.directions.to_string(),
         )?;
+        if let Some(ShadingRate { texel, coarsest }) = self.shading_rate {
+            let fits = texel.into_iter().all(|e| e.is_power_of_two() && (4..=64).contains(&e));
+            check(fits, "shading_rate.texel", "two powers of two from 4 to 64", format!("{texel:?}"))?;
+            check(coarsest <= 2, "shading_rate.coarsest", "0 to 2", coarsest.to_string())?;
+            check(
+                self.coarsest() > 0,
+                "shading_rate",
+                "none, unless samples have levels",
+                format!("one at the rate {:?}", self.rate),
+            )?;
+        }
         let weighed = self.allocation != Allocation::Constant;
         check(
             !weighed || self.predicts(),

@@ -5,7 +5,7 @@ use crate::error::{Error, Result};
 use crate::gpu::access::ImageRef;
 use crate::light::{self, Light};
 use crate::pass::gbuffer::{self, Draw};
-use crate::pass::{FrameUniform, base, tonemap};
+use crate::pass::{FrameUniform, base, shading_rate, tonemap};
 use crate::plan::Plan;
 use crate::view::View;
 use ash::vk;
@@ -84,6 +84,10 @@ pub struct FrameInputs<'a> {
     /// `R8_UINT` and of the samples' extent, sampled between its entry and exit. Coarser than the configuration's coarsest
     /// counts as that.
     pub levels: Option<ImageRef>,
+    /// With [`Config::shading_rate`]: an image of [`shading_rate::FORMAT`](crate::pass::shading_rate::FORMAT) with a texel for each
+    /// [`ShadingRate::texel`](crate::ShadingRate::texel) pixels, rounded up, to which a transfer writes between its entry and exit. Each is the
+    /// finest level of the pixels that it stands for, as `VK_KHR_fragment_shading_rate` has it.
+    pub shading_rate: Option<ImageRef>,
     /// Seed and frame number of the sample points.
     pub seed: [u32; 2],
     /// The host's image; `None` leaves the result in the renderer's own.
@@ -120,6 +124,7 @@ impl<'a> FrameInputs<'a> {
             lights: &[],
             shadows: None,
             levels: None,
+            shading_rate: None,
             seed: [0, 0],
             output: None,
         }
@@ -165,6 +170,9 @@ impl<'a> FrameInputs<'a> {
             (None, Rate::Given) => return Err(Error::invalid("levels", "an image, as the rate is Given", "none")),
             (Some(_), rate) => return Err(Error::invalid("levels", format!("none, as the rate is {rate:?}"), "an image")),
             (None, _) => {}
+        }
+        if let Some(image) = &self.shading_rate {
+            shading_rate::check(image, config.shading_rate, config.extent)?;
         }
         match &self.output {
             Some(output) => tonemap::check(&output.image, output.transfer, config.extent),

@@ -7,7 +7,7 @@ use crate::gpu::retire::Retired;
 use crate::material::Material;
 use crate::pass::fits::Packed;
 use crate::pass::maps::{MapsUpload, Uses};
-use crate::pass::{PassContext, base, filter, shade};
+use crate::pass::{PassContext, bandwidth, base, filter, shade};
 use crate::reflectance::Model;
 
 /// What passes are compiled for. Other materials of the same kinds need no other ones.
@@ -60,6 +60,8 @@ pub(crate) struct OfKinds {
     pub kinds: Kinds,
     /// What maps say at the scale of a sample.
     pub filter: filter::Filter,
+    /// Where levels follow from the predicted bandwidth of the image.
+    pub bandwidth: Option<bandwidth::Bandwidth>,
     /// Where light is looked up.
     pub base: Option<base::Base>,
     /// Where directions are drawn.
@@ -72,6 +74,7 @@ impl OfKinds {
         Ok(Self {
             kinds,
             filter: filter::Filter::new(p, config, kinds.uses, kinds.most_clusters)?,
+            bandwidth: config.predicts().then(|| bandwidth::Bandwidth::new(p, config, kinds)).transpose()?,
             base: looked_up.then(|| base::Base::new(p, config, kinds)).transpose()?,
             shade: drawn.then(|| shade::Shade::new(p, config, config.coarsest() > 0, kinds)).transpose()?,
         })
@@ -79,6 +82,9 @@ impl OfKinds {
 
     pub fn retire(self, bag: &mut Retired) {
         self.filter.retire(bag);
+        if let Some(pass) = self.bandwidth {
+            pass.retire(bag);
+        }
         if let Some(pass) = self.base {
             pass.retire(bag);
         }

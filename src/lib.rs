@@ -26,7 +26,7 @@ pub mod texture;
 mod view;
 
 pub use ash;
-pub use config::{Bins, Config, Estimator, GBufferSource, Rate};
+pub use config::{Bins, Config, Estimator, GBufferSource, Rate, ShadingRate};
 pub use distribution::{Division, Filter, Rule};
 pub use error::{Error, Result};
 pub use frame::{EnvironmentUse, FrameInputs, GBufferInput, Output, SHADOW_FORMATS, ShadowMasks};

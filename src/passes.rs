@@ -9,8 +9,8 @@ use crate::gpu::retire::{Build, Retired};
 use crate::pass::gbuffer::GBuffer;
 use crate::pass::maps::MomentPasses;
 use crate::pass::{
-    PassContext, allocate, bandwidth, brdf_map, classify, cluster_moments, curvature, environment_bandwidth, luminance, mixtures,
-    prefilter, pyramid, residual_level, resolve, texture_space, tonemap, upsample, vmf_mips,
+    PassContext, allocate, brdf_map, classify, cluster_moments, curvature, environment_bandwidth, luminance, mixtures, prefilter,
+    pyramid, residual_level, resolve, shading_rate, texture_space, tonemap, upsample, vmf_mips,
 };
 use ash::vk;
 
@@ -24,11 +24,12 @@ pub(crate) struct Passes {
     pub texture_space: Option<texture_space::TextureSpace>,
     pub gbuffer: Option<GBuffer>,
     pub curvature: Option<curvature::Curvature>,
-    pub bandwidth: Option<bandwidth::Bandwidth>,
     /// Where the errors of fits make levels.
     pub residual_level: Option<residual_level::ResidualLevel>,
     pub luminance: Option<luminance::Luminance>,
     pub pyramid: Option<pyramid::Pyramid>,
+    /// Where levels are for hardware, too.
+    pub shading_rate: Option<shading_rate::RatePass>,
     /// Where directions are drawn.
     pub classify: Option<classify::Classify>,
     /// Where samples have numbers of directions of their own.
@@ -69,10 +70,13 @@ impl Passes {
             texture_space: (config.bins == Bins::Camera).then(|| texture_space::TextureSpace::new(&mut p)).transpose()?,
             gbuffer,
             curvature: config.curvature.then(|| curvature::Curvature::new(&mut p)).transpose()?,
-            bandwidth: predicted.then(|| bandwidth::Bandwidth::new(&mut p, config)).transpose()?,
             residual_level: by_fits.then(|| residual_level::ResidualLevel::new(&mut p, config)).transpose()?,
             luminance: (top > 0 && config.rate == Rate::Luminance).then(|| luminance::Luminance::new(&mut p)).transpose()?,
             pyramid: (top > 0).then(|| pyramid::Pyramid::new(&mut p, top)).transpose()?,
+            shading_rate: config
+                .shading_rate
+                .map(|rate| shading_rate::RatePass::new(&mut p, rate, config.samples_per_side))
+                .transpose()?,
             classify: drawn.then(|| classify::Classify::new(&mut p, top, predicted)).transpose()?,
             allocate: allocated.then(|| allocate::Allocate::new(&mut p, config)).transpose()?,
             upsample: (top > 0).then(|| upsample::Upsample::new(&mut p, top)).transpose()?,
@@ -103,9 +107,6 @@ impl Passes {
         if let Some(pass) = self.curvature {
             pass.retire(bag);
         }
-        if let Some(pass) = self.bandwidth {
-            pass.retire(bag);
-        }
         if let Some(pass) = self.residual_level {
             pass.retire(bag);
         }
@@ -113,6 +114,9 @@ impl Passes {
             pass.retire(bag);
         }
         if let Some(pass) = self.pyramid {
+            pass.retire(bag);
+        }
+        if let Some(pass) = self.shading_rate {
             pass.retire(bag);
         }
         if let Some(pass) = self.classify {

@@ -4,7 +4,7 @@ use crate::config::{Config, GBufferSource, MAX_LEVEL, Rate};
 use crate::frequency::allocation::{Allocation, BINS};
 use crate::gpu::image::ImageDesc;
 use crate::light::{LightRecord, MAX_LIGHTS};
-use crate::pass::{bandwidth, luminance};
+use crate::pass::{bandwidth, luminance, shading_rate};
 use ash::vk;
 
 /// Sizes that follow from a [`Config`].
@@ -28,6 +28,8 @@ pub(crate) struct Plan {
     pub prediction: Option<ImageDesc>,
     /// Whether each sample of the list gets a number of directions of its own.
     pub allocated: bool,
+    /// Bytes of the shading-rate attachment's texels.
+    pub rate_bytes: Option<u64>,
     /// Linear radiance: of samples, and below them of cells of even levels.
     pub radiance: ImageDesc,
     /// Linear radiance that is looked up, where `radiance` is what is left.
@@ -156,6 +158,7 @@ impl Plan {
                 image("prediction", vk::Format::R16G16B16A16_SFLOAT, blocks, storage | vk::ImageUsageFlags::TRANSFER_DST)
             }),
             allocated: config.allocation != Allocation::Constant,
+            rate_bytes: config.shading_rate.map(|rate| shading_rate::bytes(rate, config.extent)),
             radiance: values("radiance", shading[0], even_rows),
             base: config.estimator.has_residual().then(|| values("base", shading[0], shading[1])),
             odd: (levels.top > 0).then(|| values("odd", shading[0].div_ceil(2), odd_rows)),
@@ -263,6 +266,7 @@ pub fn memory_footprint(config: &Config) -> Footprint {
     let buffers = plan.cell_buffers().into_iter().chain(plan.allocation_buffers());
     rows.extend(buffers.filter(|b| b.1 > 0).map(|(name, bytes)| FootprintRow { name, bytes }));
     rows.extend(plan.luminance_buffers(config).into_iter().flatten().map(|(name, bytes)| FootprintRow { name, bytes }));
+    rows.extend(plan.rate_bytes.map(|bytes| FootprintRow { name: "rates", bytes }));
     if let Some(blocks) = plan.prediction {
         let [width, height, _] = blocks.extent;
         rows.push(FootprintRow { name: "forecast", bytes: bandwidth::FORECAST_BYTES });

@@ -21,7 +21,7 @@ use crate::pass::materials::{MaterialBridge, MaterialImages};
 use crate::pass::object_cells::ObjectCells;
 use crate::pass::{
     FrameUniform, allocate, bandwidth, base, classify, curvature, filter, level, luminance, pyramid, residual_level, resolve,
-    shade, texture_space, tonemap, upsample, vmf_mips,
+    shade, shading_rate, texture_space, tonemap, upsample, vmf_mips,
 };
 use crate::passes::Passes;
 use crate::plan::{Directions, LIGHT_BYTES};
@@ -209,7 +209,7 @@ impl Renderer {
         // 4  The level of every sample: predicted, by the frame before, the same, or the host's.
         let shading = targets.plan.shading;
         let analysed = environment.bandwidth.as_ref().zip(materials.bandwidths.as_ref());
-        let predict = passes.bandwidth.as_ref().zip(analysed).zip(targets.prediction.as_ref());
+        let predict = of_kinds.bandwidth.as_ref().zip(analysed).zip(targets.prediction.as_ref());
         let mut forecast = None;
         let level = match (&targets.level, &inputs.levels) {
             (Some(level), _) if let Some(((pass, (environment_bandwidth, material_bandwidths)), prediction)) = predict => {
@@ -225,6 +225,7 @@ impl Renderer {
                         material_bandwidths,
                         normals,
                         factors,
+                        lobes,
                         lights,
                         light_count: exact + area,
                         shadows,
@@ -281,6 +282,11 @@ impl Renderer {
                 },
             );
             from = classify::From::Cells(cells, &buffers.weights, forecast.map(|f| (f, bandwidth::OF_SAMPLES)));
+        }
+
+        if let (Some(pass), Some(rates), Some(view)) = (&passes.shading_rate, &targets.rates, level) {
+            let (level, target) = ((view, samplers.nearest), inputs.shading_rate.as_ref());
+            pass.record(rec, &shading_rate::Io { frame, bridge, level, extent: self.config.extent, rates, target });
         }
 
         // 6  Which samples to shade.

@@ -30,6 +30,8 @@ pub(crate) struct Targets {
     /// The frame before's tiles and mean luminance, where they decide.
     pub luminance: Option<[Buffer; 2]>,
     pub cells: Option<CellBuffers>,
+    /// Texels of the shading-rate attachment.
+    pub rates: Option<Buffer>,
     pub radiance: Image,
     /// What is looked up, where `radiance` is what is left.
     pub base: Option<Image>,
@@ -99,6 +101,10 @@ impl Targets {
                 })
                 .transpose()?,
             cells: (plan.levels.top > 0).then(|| CellBuffers::new(build, &plan)).transpose()?,
+            rates: plan
+                .rate_bytes
+                .map(|bytes| Buffer::new(build, "rates", bytes, storage | source, Location::Device))
+                .transpose()?,
             radiance: Image::new(build, plan.radiance)?,
             base: plan.base.map(|desc| Image::new(build, desc)).transpose()?,
             odd: plan.odd.map(|desc| Image::new(build, desc)).transpose()?,
@@ -128,6 +134,7 @@ impl Targets {
         match name {
             "arguments" => Some(&self.arguments),
             "list" => Some(&self.list),
+            "rates" => self.rates.as_ref(),
             "forecast" => self.prediction.as_ref().map(|p| &p.forecast),
             "cells" => cells.map(|c| &c.cells),
             "blocks" => cells.map(|c| &c.blocks),
@@ -149,7 +156,7 @@ impl Targets {
         let cells = self.cells.map(|c| vec![c.cells, c.blocks, c.weights, c.arguments]);
         let allocation = self.allocation.map(|a| Vec::from(a.into_buffers()));
         let optional = [cells, predicted, self.luminance.map(Vec::from), allocation].into_iter().flatten().flatten();
-        for buffer in optional.chain([self.arguments, self.list]) {
+        for buffer in optional.chain(self.rates).chain([self.arguments, self.list]) {
             states.forget(buffer.handle);
             buffer.retire(bag);
         }

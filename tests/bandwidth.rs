@@ -3,6 +3,8 @@
 
 #[path = "support/chosen_device.rs"]
 mod chosen_device;
+#[path = "support/filters.rs"]
+mod filters;
 #[path = "support/frames.rs"]
 mod frames;
 #[path = "support/prediction.rs"]
@@ -21,7 +23,7 @@ use passband::offline::builtin;
 use passband::offline::metrics::{Exposure, Pair, Picture, compare};
 use passband::offline::world::World;
 use passband::sampling::LatLong;
-use passband::{Config, Estimator, Light, Maps, Rate, Texture};
+use passband::{Config, Estimator, Filter, Light, Maps, Rate, Texture};
 use prediction::{Frame, Twin};
 use read_back::{session, surface};
 use std::sync::Arc;
@@ -139,6 +141,30 @@ fn the_pass_is_as_its_twin() {
     // Few enough that the frame does not fall back.
     let pixels = Config { samples_per_side: 2, samples_per_cycle: Some(1.0), ..predicted([41, 35], 64) };
     against_the_twin(&lit, &pixels, &[(Operator::Covariance, Combine::Max)]);
+}
+
+/// Where the filter finds lobes, these are the reflectance.
+#[test]
+fn the_lobes_of_a_pixel_are_what_is_predicted_from() {
+    let glossy = ggx(0.03, DVec3::new(0.5, 0.4, 0.3), DVec3::splat(0.4));
+    let maps = Maps { normal: filters::normals([128; 2], 0.5), ..Maps::default() };
+    let mut bumps = filters::scene("sphere", glossy, maps);
+    let mean = |config: &Config| {
+        let mut session = session(&bumps, config);
+        session.frame([9, 3]).unwrap();
+        let frame = Frame::read(&mut session);
+        let of: Vec<f64> = frame.prediction.iter().filter(|p| p[3] > 0.0).map(|p| p[0]).collect();
+        of.iter().sum::<f64>() / of.len() as f64
+    };
+    let shaded = |filter| mean(&Config { filter, curvature: true, samples_per_cycle: Some(0.5), ..predicted([48, 40], 64) });
+    let [kept, widened] = [Filter::Fixed, Filter::Toksvig].map(shaded);
+    println!("cycles/pixel of lobes that stay as they are {kept:.3}, as wide as what they stand for {widened:.3}");
+    assert!(widened < 0.9 * kept, "{widened} {kept}");
+    bumps.lights = vec![Light::Directional { direction: [0.3, -1.0, -0.4], irradiance: [1.0, 2.0, 3.0] }];
+    for filter in [Filter::Vmf1, Filter::Vmf8] {
+        let config = Config { filter, samples_per_cycle: Some(0.5), ..predicted([96, 80], 64) };
+        against_the_twin(&bumps, &config, &[(Operator::Clipped, Combine::Mean)]);
+    }
 }
 
 /// A mirror ball in light of one frequency: the spectrum of the image's windows against what the operator says of their middle.

@@ -116,6 +116,7 @@ fn every_documented_flag_works_or_is_not_supported_yet() {
                 "decision" => &["--estimator", "residual", "--rate", "bandwidth"],
                 "residual" if flag == "--aov" => &["--estimator", "residual", "--rate", "bandwidth"],
                 "lobes" => &["--filter", "vmf"],
+                "shading-rate" => &["--rate", "half"],
                 _ => &[],
             };
             let run = folder.render("furnace", &[&[flag, value, "-o", "out.exr"], beside].concat());

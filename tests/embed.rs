@@ -120,6 +120,7 @@ fn host_images_are_left_as_their_exit_says() {
             lights: &[],
             shadows: None,
             levels: None,
+            shading_rate: None,
             seed: [0, 0],
             output: Some(Output { image: output, transfer: Transfer::Linear }),
         };

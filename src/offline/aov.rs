@@ -3,7 +3,7 @@
 use crate::offline::error::{Error, Result};
 use crate::offline::session::Session;
 use crate::offline::{decision, footprint, levels};
-use crate::{Config, Estimator};
+use crate::{Config, Estimator, ShadingRate};
 
 /// A layer that `--aov` names.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -24,6 +24,9 @@ pub enum Aov {
     Curvature,
     /// Level of the coarsest cell around the pixel that has a value: 0 is an output pixel, +1 is 2x2 coarser.
     Level,
+    /// Pixels that the shading-rate attachment lets hardware shade at once there, by the logarithm to base 2 of their side, in texels of
+    /// [`SHADING_RATE`].
+    ShadingRate,
     /// Valid share of the weight of the sample's parents, in steps of 1/63; 0 where it was shaded without asking them.
     Weight,
     /// Predicted bandwidth of the image in cycles a pixel.
@@ -49,7 +52,7 @@ pub enum Aov {
     Mip,
 }
 
-const ALL: [(&str, Aov); 19] = [
+const ALL: [(&str, Aov); 20] = [
     ("depth", Aov::Depth),
     ("normal", Aov::Normal),
     ("material", Aov::Material),
@@ -58,6 +61,7 @@ const ALL: [(&str, Aov); 19] = [
     ("footprint", Aov::Footprint),
     ("curvature", Aov::Curvature),
     ("level", Aov::Level),
+    ("shading-rate", Aov::ShadingRate),
     ("weight", Aov::Weight),
     ("bandwidth", Aov::Bandwidth),
     ("spread", Aov::Spread),
@@ -82,6 +86,9 @@ impl std::str::FromStr for Aov {
         Err(Error::argument("--aov", format!("some of {names}"), format!("`{name}`")))
     }
 }
+
+/// What [`Aov::ShadingRate`] asks for: what most devices have.
+pub const SHADING_RATE: ShadingRate = ShadingRate { texel: [16, 16], coarsest: 2 };
 
 /// A channel of a layered image: its name and row-major samples.
 pub type Channel = (String, Vec<f32>);
@@ -164,6 +171,15 @@ impl Aov {
                 let pixel = side.ilog2() as f32;
                 let levels = covered.of(levels::coarsest(session)?).map(|t| t[0] as f32 - pixel);
                 scalar(levels.iter().zip(mask).map(|(level, mask)| level * mask).collect())
+            }
+            Self::ShadingRate => {
+                let none = |_| Error::argument("--aov shading-rate", "a --rate with levels beside it", "the full rate");
+                let bytes: Vec<u8> = session.words("rates").map_err(none)?.into_iter().flat_map(u32::to_le_bytes).collect();
+                let [width, height] = covered.output;
+                let [w, h] = SHADING_RATE.texel.map(|e| e as usize);
+                let row = width.div_ceil(w).next_multiple_of(4);
+                let rate = |i: usize| bytes.get(i / width / h * row + i % width / w).map_or(0.0, |r| f32::from(r & 3));
+                scalar((0..width * height).map(rate).collect())
             }
             Self::Weight => {
                 let weights = levels::weights(session)?.into_iter().map(f32::to_bits).collect();

@@ -2,7 +2,7 @@
 
 use crate::frequency::allocation::Allocation;
 use crate::gpu::timer::FrameTimings;
-use crate::offline::aov::Aov;
+use crate::offline::aov::{Aov, SHADING_RATE};
 use crate::offline::bench::quality::Noise;
 use crate::offline::error::Result;
 use crate::offline::headless::{Headless, Options};
@@ -77,11 +77,12 @@ impl Settings {
             frames_in_flight: 1,
             curvature: self.config.curvature || self.aovs.iter().any(|a| a.needs_curvature()),
             coordinates: self.config.coordinates || self.aovs.iter().any(|a| a.needs_coordinates()),
+            shading_rate: (self.config.coarsest() > 0 && self.aovs.contains(&Aov::ShadingRate)).then_some(SHADING_RATE),
             ..self.config.clone()
         };
         let Some(directions) = self.reference else { return base };
         let (rate, estimator, allocation) = (Rate::Full, Estimator::Mis, Allocation::Constant);
-        Config { rate, estimator, allocation, directions: directions.min(REFERENCE_CHUNK), ..base }
+        Config { rate, estimator, allocation, shading_rate: None, directions: directions.min(REFERENCE_CHUNK), ..base }
     }
 
     /// As `--rate` calls it.

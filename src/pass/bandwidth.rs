@@ -14,8 +14,10 @@ use crate::gpu::pipeline::{BridgeSets, ComputePipeline, Interface, Resource};
 use crate::gpu::recorder::Recorder;
 use crate::gpu::retire::{Build, Retired};
 use crate::gpu::sampler::Samplers;
+use crate::kinds::Kinds;
 use crate::pass::environment::EnvironmentImages;
 use crate::pass::materials::{Bandwidths, MaterialImages};
+use crate::pass::shade::lobe_constants;
 use crate::pass::{PassContext, classify, level, pyramid};
 use ash::vk::{self, DescriptorType as D};
 use bytemuck::{Pod, Zeroable};
@@ -54,6 +56,7 @@ pub const INTERFACE: Interface = Interface {
         D::STORAGE_BUFFER,
         D::STORAGE_BUFFER,
         D::STORAGE_BUFFER,
+        D::COMBINED_IMAGE_SAMPLER,
         D::COMBINED_IMAGE_SAMPLER,
     ],
 };
@@ -142,6 +145,7 @@ pub(crate) struct Io<'a> {
     /// Of the `filter` pass.
     pub normals: &'a Image,
     pub factors: &'a Image,
+    pub lobes: &'a Image,
     /// Exact lights first.
     pub lights: &'a Buffer,
     pub light_count: u32,
@@ -163,7 +167,7 @@ pub(crate) struct Bandwidth {
 }
 
 impl Bandwidth {
-    pub fn new(p: &mut PassContext<'_, '_>, config: &Config) -> Result<Self> {
+    pub fn new(p: &mut PassContext<'_, '_>, config: &Config, kinds: Kinds) -> Result<Self> {
         let operator = match config.operator {
             Operator::Box => 0,
             Operator::Clipped => 1,
@@ -182,7 +186,9 @@ impl Bandwidth {
             Allocation::RelativeDeviation => 3,
         };
         let mut make = |lights| {
-            let constants = [operator, combine, u32::from(config.widened()), lights, allocation];
+            // One stands between these and those of lobes.
+            let own = [operator, combine, u32::from(config.widened()), lights, allocation, 0];
+            let constants: Vec<_> = own.into_iter().chain(lobe_constants(config, kinds)).collect();
             ComputePipeline::new(p.build, p.modules, &INTERFACE, p.bridge, p.slots, &constants)
         };
         let rate = config.samples_per_cycle.unwrap_or(samples_per_cycle(config.directions_a_pixel()) as f32);
@@ -208,6 +214,7 @@ impl Bandwidth {
         rec.buffer(&io.material_bandwidths.textures, Access::COMPUTE_READ);
         rec.image(io.normals, Access::COMPUTE_SAMPLED);
         rec.image(io.factors, Access::COMPUTE_SAMPLED);
+        rec.image(io.lobes, Access::COMPUTE_SAMPLED);
         level::clear(rec, io.level, 0);
         level::clear(rec, prediction, 0);
         rec.image(io.level, Access::COMPUTE_WRITE);
@@ -251,6 +258,7 @@ impl Bandwidth {
             Resource::Buffer(blocks),
             Resource::Buffer(&io.material_bandwidths.textures),
             Resource::View(io.shadows, io.samplers.nearest),
+            Resource::Sampled(io.lobes, io.samplers.nearest),
         ];
         let pipeline = &self.pipelines[usize::from(io.light_count > 0)];
         let push = Push { all, dark: io.dark, ..self.push };

@@ -30,6 +30,7 @@ pub mod pyramid;
 pub mod residual_level;
 pub mod resolve;
 pub mod shade;
+pub mod shading_rate;
 pub mod texture_space;
 pub mod tonemap;
 pub mod upsample;

@@ -35,6 +35,7 @@ modules! {
     "bandwidth.blocks.comp",
     "bandwidth.comp",
     "pyramid.comp",
+    "shading_rate.comp",
     "classify.comp",
     "classify.levels.comp",
     "residual_level.comp",

@@ -6,6 +6,8 @@
 //! Beside [`analytic`] the estimate reads 1.1 to 1.5 times for Gaussian lobes (concentrations 1000 to 10) and 1.1 to 2 times for
 //! GGX, whose tails go on: on the safe side.
 
+use crate::distribution::reflected::ReflectedLobe;
+use crate::distribution::vmf;
 use crate::frequency::environment::FLOOR;
 use crate::frequency::wavelet::{Grid, LocalFrequency};
 use crate::reflectance::{Model, Reflectance, turned};
@@ -124,7 +126,7 @@ pub struct Narrow {
 
 /// The narrowest lobe of a model that says how concentrated its normals are, seen at `cosine`: a lobe of concentration k about
 /// mu reflects into one of k / (4 |mu.wo|) (Wang et al. 2009, "All-frequency rendering of dynamic, spatially-varying
-/// reflectance", section 3), whose power spectrum is normal with deviation sqrt(k / 2) / 2 pi. GGX counts as the Gaussian of
+/// reflectance", section 3). GGX counts as the Gaussian of
 /// its centre, k = 2 / alpha^2. `None` for tables and where nothing shines.
 pub fn analytic(model: &Model, cosine: f64) -> Option<Narrow> {
     let lobes: Vec<(DVec3, f64)> = match model {
@@ -137,8 +139,29 @@ pub fn analytic(model: &Model, cosine: f64) -> Option<Narrow> {
     // Turned towards the viewer's far side, where the reflected lobe is narrowest.
     let towards = |mu: DVec3| (mu.z * cosine - mu.x.hypot(mu.y) * sine).abs().max(0.05);
     let narrowest = lobes.into_iter().map(|(mu, kappa)| kappa / (4.0 * towards(mu))).fold(0.0, f64::max);
-    (narrowest > 0.0)
-        .then(|| Narrow { bandwidth: QUANTILE * (narrowest / 2.0).sqrt() / TAU, deviation: narrowest.sqrt().recip() })
+    (narrowest > 0.0).then(|| Narrow { bandwidth: lobe_cycles(narrowest), deviation: narrowest.sqrt().recip() })
+}
+
+/// Cycles/radian of a lobe of light directions of concentration `kappa`: its power spectrum is normal, with deviation
+/// sqrt(kappa / 2) / 2 pi.
+pub fn lobe_cycles(kappa: f64) -> f64 {
+    QUANTILE * (kappa / 2.0).sqrt() / TAU
+}
+
+/// Concentration that stands for a cosine over the horizon.
+const COSINE: f64 = 2.0;
+
+/// Cycles/radian about the light direction `wi` (unit, z the normal) where the reflectance is `lobes`, as a filter finds them, and a
+/// diffuse part in 1/sr: the mean over them by what each reflects from there. Twin of `glsl/include/found_bandwidth.glsl`.
+pub fn found(lobes: &[ReflectedLobe], diffuse: f64, wi: DVec3) -> f64 {
+    let diffuse = (diffuse * wi.z, lobe_cycles(COSINE));
+    let share = |l: &ReflectedLobe| {
+        let height = vmf::normalisation(l.kappa) * (-0.5 * l.kappa * (wi - l.direction).length_squared()).exp();
+        (l.weight.element_sum() / 3.0 * height, lobe_cycles(l.kappa))
+    };
+    let (sum, weights) =
+        lobes.iter().map(share).chain([diffuse]).fold((0.0, 0.0), |(s, w), (weight, c)| (s + weight * c, w + weight));
+    if weights > 0.0 { sum / weights } else { 0.0 }
 }
 
 /// Theta of the viewer of tile `angle`.

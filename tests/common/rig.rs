@@ -228,6 +228,7 @@ impl Target {
             lights: &[],
             shadows: None,
             levels: None,
+            shading_rate: None,
             seed: [7, 0],
             output: Some(Output { image: self.image, transfer: Transfer::Linear }),
         }

@@ -1,13 +1,17 @@
 //! The `bandwidth` pass in f64, block by block, from a frame's own images.
 #![allow(dead_code, reason = "each test file uses its part")]
 
+#[path = "found.rs"]
+mod found;
+
+use found::Found;
 use glam::{DMat3, DVec2, DVec3};
 use passband::frequency::allocation::{DARK, Integrand};
 use passband::frequency::operators::{Combine, Probe, Surface, nearby, pixel_angle};
 use passband::frequency::{AngularBandwidth, TextureCells};
 use passband::offline::session::Session;
 use passband::offline::world::World;
-use passband::reflectance::{ImportanceTable, LobeBandwidth, Reflectance};
+use passband::reflectance::{ImportanceTable, LobeBandwidth, Model, Reflectance};
 use passband::sampling::{luminance, sobol};
 use passband::{Config, Light, Material, Sampling};
 
@@ -24,6 +28,8 @@ pub struct Frame {
     curvatures: Vec<[f64; 4]>,
     coordinates: Vec<[f64; 4]>,
     derivatives: Vec<[f64; 4]>,
+    /// Layer after layer.
+    lobes: Vec<[u32; 4]>,
     /// Blocks a side.
     pub blocks: [usize; 2],
     /// Bandwidth and spread of each block.
@@ -51,7 +57,8 @@ impl Frame {
         let [normals, curvatures, coordinates, derivatives] =
             ["normals", "curvature", "coordinate", "derivative"].map(|name| texels(session, name).0);
         let [ids, levels] = ["ids", "level"].map(|name| bytemuck::pod_collect_to_vec(&session.image(name).unwrap().0));
-        Self { extent, ids, surface, normals, curvatures, coordinates, derivatives, blocks, prediction, levels }
+        let lobes = bytemuck::pod_collect_to_vec(&session.image("lobes").unwrap().0);
+        Self { lobes, extent, ids, surface, normals, curvatures, coordinates, derivatives, blocks, prediction, levels }
     }
 
     /// Samples of a block: their indices, and twice their offsets from its middle squared. At the border some stand twice.
@@ -133,29 +140,43 @@ impl<'a> Twin<'a> {
         let steps = [DVec2::new(ux, vx), DVec2::new(uy, vy)];
         let reflectance = material.at(DVec2::new(u, v), steps, Sampling::default()).reflectance(&material.model);
 
+        // What the filter found, of GGX.
+        let layers = if config.filter.lobe_layers() > 0 { frame.lobes.chunks_exact(frame.ids.len()) } else { [].chunks_exact(1) };
+        let found = match material.model {
+            Model::Ggx(ggx) => Found::unpack(layers.map(|layer| layer[at]), &local, ggx),
+            _ => None,
+        };
+        let evaluate = |wi| found.as_ref().map_or_else(|| reflectance.evaluate(wi, wo), |f| f.evaluate(wi, wo));
+        let lobe_at = |wi| found.as_ref().map_or_else(|| lobes.at(wi, wo), |f| f.bandwidth(wi, wo));
+
         let mut all = Directions { config, surface, found: Vec::new() };
         let blocks = ((block / frame.blocks[0]) << 16) | (block % frame.blocks[0]);
         let mut estimates = Vec::new();
         let mut integrands = Vec::new();
         for i in 0..config.probes {
             let point = sobol::point(i, sobol::hash(blocks as u32) ^ seed).map(sobol::to_unit);
-            let (h, density) = table.half_vector(wo.z, point);
-            let cosine = wo.dot(h);
-            let wi = 2.0 * cosine * h - wo;
+            let drawn = match &found {
+                Some(found) => found.sample(wo, point).map(|wi| (wi, 1.0 / found.density(wi, wo))),
+                None => {
+                    let (h, density) = table.half_vector(wo.z, point);
+                    let cosine = wo.dot(h);
+                    (cosine > 0.0).then(|| (2.0 * cosine * h - wo, 4.0 * cosine / density))
+                }
+            };
             let (Some(light), Some(bandwidth)) = (&self.world.environment, &self.environment) else { continue };
-            if cosine <= 0.0 || wi.z <= 0.0 {
+            let Some((wi, per_density)) = drawn.filter(|(wi, _)| wi.z > 0.0) else {
                 estimates.push(0.0);
                 integrands.push(Integrand::default());
                 continue;
-            }
+            };
             let towards = local * wi;
             let radiance = luminance(light.radiance(towards));
-            let reflected = luminance(reflectance.evaluate(wi, wo)) * wi.z;
+            let reflected = luminance(evaluate(wi)) * wi.z;
             let turned = DMat3::from_rotation_y(-light.rotation.to_radians()) * towards;
-            all.add(bandwidth.towards(turned), lobes.at(wi, wo), 0.0, [radiance, reflected, 4.0 * cosine / density]);
-            let estimate = radiance * reflected * 4.0 * cosine / density;
+            all.add(bandwidth.towards(turned), lobe_at(wi), 0.0, [radiance, reflected, per_density]);
+            let estimate = radiance * reflected * per_density;
             estimates.push(estimate);
-            let angular = bandwidth.towards(turned) + lobes.at(wi, wo);
+            let angular = bandwidth.towards(turned) + lobe_at(wi);
             integrands.push(Integrand { bandwidth: angular, product: radiance * reflected / wi.z, estimate });
         }
         let mut by_lights = 0.0;
@@ -163,10 +184,10 @@ impl<'a> Twin<'a> {
             let (towards, distance, radiance) = arrives(light, point);
             let wi = local.transpose() * towards;
             if wi.z > 0.0 {
-                let reflected = luminance(reflectance.evaluate(wi, wo)) * wi.z;
+                let reflected = luminance(evaluate(wi)) * wi.z;
                 let near = nearby(distance, wi.z);
                 by_lights += radiance * reflected;
-                all.add(SHARPEST, lobes.at(wi, wo), near, [radiance, reflected, f64::from(config.probes)]);
+                all.add(SHARPEST, lobe_at(wi), near, [radiance, reflected, f64::from(config.probes)]);
             }
         }
         let longest = steps.iter().map(|d| d.length()).fold(0.0, f64::max);
