@@ -1,8 +1,10 @@
 //! `vmf.glsl` against `distribution::vmf`.
 
 use crate::{COUNT, Device, Worst, direction, entry, rounded, unit};
-use glam::Vec3;
+use glam::{DVec2, DVec3, Vec3};
 use passband::distribution::vmf::{self, Lobe};
+use passband::sampling::latlong;
+use std::f64::consts::{PI, TAU};
 
 /// Relative errors, from 1e-2 to 1e5.
 const BOUND: f64 = 1e-4;
@@ -57,4 +59,51 @@ fn edges_are_finite() {
         let expected = vmf::concentration(s.into());
         assert!((f64::from(got[0][2]) - expected).abs() <= 1e-4 * expected, "{s}: {} for {expected}", got[0][2]);
     }
+}
+
+/// `texel_kernel.glsl` in f64: each of the four texels of a bilinear look-up under a lobe about itself, without the variance that
+/// look-ups add.
+fn texel_kernel(centre: DVec3, kappa: f64, variance_in_texels: f64, w: DVec3) -> f64 {
+    let texel = (kappa * variance_in_texels).sqrt().recip();
+    let columns = (TAU / texel).round();
+    let size = DVec2::new(columns, 0.5 * columns);
+    let at = latlong::uv(centre) * size - 0.5;
+    let along = at - at.floor();
+    let corner = |[x, y]: [f64; 2]| {
+        let uv = (at.floor() + DVec2::new(x, y) + 0.5) / size;
+        let (mu, sine) = (latlong::direction(uv), (PI * uv.y).sin());
+        let variance = texel * texel / 12.0 * (1.0 + sine * sine);
+        let narrow = vmf::concentration((vmf::spread(kappa) - variance) / (1.0 - variance));
+        let share = |t: f64, c: f64| if c > 0.0 { t } else { 1.0 - t };
+        share(along.x, x) * share(along.y, y) * Lobe { mu, kappa: narrow, weight: 1.0 }.density(w)
+    };
+    [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]].map(corner).iter().sum()
+}
+
+#[test]
+fn look_ups_hold_what_their_texels_do() {
+    // Of the levels of a chain of 128 columns, whose concentrations are a factor of 2 apart.
+    let inputs: Vec<(Vec3, f32, Vec3, f32)> = (0..COUNT)
+        .map(|i| {
+            let [level, reach] = unit(i, 11);
+            let step = (level * 8.0).floor();
+            let variance: f64 = if step % 2.0 == 0.0 { 4.0 } else { 2.0 };
+            let kappa = (128.0 / TAU).powi(2) / 4.0 * (-step).exp2();
+            let (centre, other) = (direction(i, 12), direction(i, 13));
+            let width = 4.0 * reach / kappa.max(1.0).sqrt();
+            (centre, kappa as f32, rounded(centre.as_dvec3() + other.as_dvec3() * width), variance as f32)
+        })
+        .collect();
+    let entries: Vec<_> =
+        inputs.iter().flat_map(|&(mu, kappa, w, v)| [entry(mu, kappa.to_bits()), entry(w, v.to_bits())]).collect();
+    let output = Device::bare().probe("texel_kernel", &entries);
+    let (mut worst, mut sum) = (Worst::default(), 0.0);
+    for (&(centre, kappa, w, variance), got) in inputs.iter().zip(output.chunks(2)) {
+        let expected = texel_kernel(centre.as_dvec3(), kappa.into(), variance.into(), w.as_dvec3());
+        let off = (f64::from(got[0][0]) - expected) / f64::from(kappa);
+        sum += off;
+        worst.add(off.abs(), || format!("{centre}, {kappa}, {w}, {variance}: {} for {expected}", got[0][0]));
+    }
+    println!("mean {:.2e}", sum / inputs.len() as f64);
+    worst.within("texel_kernel", BOUND);
 }
