@@ -20,6 +20,8 @@ pub(crate) struct Kinds {
     pub reflected: bool,
     /// The most lobes that stand for one where light is looked up.
     pub most_lobes: u32,
+    /// The most lobes that one has as its own reflectance.
+    pub most_own_lobes: u32,
     /// Where light is looked up, a bit for each `REFLECTANCE_*` of `glsl/bridge/materials.glsl` that there is.
     pub models: u32,
     /// Some that depend on texture coordinates or tangents.
@@ -35,11 +37,8 @@ impl Kinds {
     pub fn of(materials: &[Material], maps: &MapsUpload, fits: &Packed, filter: Filter, models: u32) -> Self {
         let found = &maps.found;
         let layers = filter.lobe_layers() / if filter.has_slopes() { 2 } else { 1 };
-        let own = |(material, found): (&Material, &bool)| match &material.model {
-            _ if *found => layers,
-            Model::Vmf(vmf) => vmf.lobes().len() as u32,
-            _ => 1,
-        };
+        let own_lobes = |material: &Material| if let Model::Vmf(vmf) = &material.model { vmf.lobes().len() as u32 } else { 1 };
+        let own = |(material, found): (&Material, &bool)| if *found { layers } else { own_lobes(material) };
         let without = materials.iter().zip(found).zip(&fits.firsts).filter(|(_, first)| **first == 0);
         let reflected = without.map(|(material, _)| own(material)).max();
         Self {
@@ -47,6 +46,7 @@ impl Kinds {
             fitted: fits.most > 0,
             reflected: reflected.is_some(),
             most_lobes: reflected.unwrap_or_default().max(fits.most as u32),
+            most_own_lobes: materials.iter().map(own_lobes).max().unwrap_or_default(),
             models,
             coordinates: materials.iter().any(Material::takes_coordinates),
             uses: maps.uses,

@@ -145,13 +145,15 @@ impl Renderer {
                 (None, None) => {}
             }
         }
+        let (records, counts) = light::records(inputs.lights);
+        let [exact, area] = counts;
+        let lit = inputs.environment.intensity > 0.0;
+        shade::check_rounds(self.cx.most_rounds, &self.config, of_kinds.kinds, lit, area)?;
         if let Some(timings) = self.timer.begin_frame(&self.cx, cmd, inputs.slot)? {
             self.timings = Some(timings);
         }
         let coordinates = self.config.coordinates || of_kinds.kinds.coordinates;
         let clear = self.targets.gbuffer.as_mut().is_some_and(|images| images.expect(coordinates));
-        let (records, counts) = light::records(inputs.lights);
-        let [exact, area] = counts;
         let uniform = inputs.uniform(&self.config, &self.targets.plan, counts);
         self.uniforms[inputs.slot].bytes_mut().copy_from_slice(bytemuck::bytes_of(&uniform));
         let records: &[u8] = bytemuck::cast_slice(&records);
@@ -294,7 +296,7 @@ impl Renderer {
         if let Some(classify) = &passes.classify {
             classify.record(rec, &classify::Io { frame, bridge, from, arguments, list });
         }
-        let directions = Directions::of(&self.config, inputs.environment.intensity > 0.0, area);
+        let directions = Directions::of(&self.config, lit, area);
         let mut to_shade = list;
         if let (Some(pass), Some(buffers), Some(prediction)) = (&passes.allocate, &targets.allocation, &targets.prediction) {
             let prediction = &prediction.image;

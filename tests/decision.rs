@@ -12,12 +12,14 @@ use glam::{DVec2, DVec3};
 use passband::distribution::{Budget, LobeFit};
 use passband::offline::aov::Aov;
 use passband::offline::builtin;
-use passband::offline::headless::Options;
+use passband::offline::headless::{Headless, Options};
 use passband::offline::image_io::LinearImage;
+use passband::offline::rates::oracle;
 use passband::offline::reference::MIN_COSINE;
 use passband::offline::render::{Settings, render};
+use passband::offline::session::Session;
 use passband::offline::world::World;
-use passband::{Config, Estimator, Filter, Light, Rate};
+use passband::{Config, Estimator, Filter, Light, Rate, Requirements};
 use std::sync::OnceLock;
 use support::frames::{config, table, world};
 
@@ -189,4 +191,62 @@ fn area_lights_are_not_left_out() {
     let ratio = sum(&image) / sum(&alone);
     assert!((ratio - 1.0).abs() < 0.02, "{ratio}");
     assert!(layer(&image, "decision.Y").iter().zip(layer(&image, "A")).all(|(d, a)| *d == if *a > 0.0 { 2.0 } else { -1.0 }));
+}
+
+/// Share of covered pixels that are shaded, and the error of display values relative to converged ones.
+fn worth(session: &mut Session, converged: &[[f32; 4]]) -> [f64; 2] {
+    session.frame([3, 0]).unwrap();
+    let frame: Vec<[f32; 4]> = bytemuck::pod_collect_to_vec(&session.image("resolved").unwrap().0);
+    let covered: Vec<_> = converged.iter().zip(&frame).filter(|(c, _)| c[3] > 0.0).collect();
+    let shown = |v: f32| f64::from(v.clamp(0.0, 1.0)).powf(1.0 / 2.2);
+    let square = |(a, b): &(&[f32; 4], &[f32; 4])| (0..3).map(|c| (shown(a[c]) - shown(b[c])).powi(2)).sum::<f64>();
+    let error = covered.iter().map(square).sum::<f64>() / (3.0 * covered.len() as f64);
+    [f64::from(session.shaded().unwrap()) / covered.len() as f64, -10.0 * error.log10()]
+}
+
+/// Whether levels of residuals are better taken from the predicted bandwidth of the image than from the errors of fits: at as many
+/// shaded samples they are not.
+#[test]
+#[ignore = "minutes"]
+fn levels_by_errors_beside_levels_by_bandwidth() {
+    let device = Options { device: Some(DEVICE.into()), validate: false };
+    let mut gains = Vec::new();
+    for (mesh, name, light) in [
+        ("sphere", "metallic-paint", "sun-sky"),
+        ("torus-knot", "satin", "studio"),
+        ("torus-knot", "gloss-plastic", "sun-sky"),
+        ("bumpy-sphere", "mirror-metal", "studio"),
+        ("bumpy-sphere", "rough", "sun-sky"),
+    ] {
+        let world = world(mesh, 128, table(name), builtin::environment(light, 512).unwrap());
+        let of =
+            |config: &Config| Session::new(Headless::new(&device, &Requirements::of(config)).unwrap(), &world, config).unwrap();
+        let extent = [192, 192];
+        let mut full = of(&config(extent, Estimator::Mis, 8192));
+        full.frame([1, 0]).unwrap();
+        let converged: Vec<[f32; 4]> = bytemuck::pod_collect_to_vec(&full.image("resolved").unwrap().0);
+        let by_errors = Config { rate: Rate::Bandwidth, ..config(extent, Estimator::Residual, 64) };
+        let [shaded, psnr] = worth(&mut of(&by_errors), &converged);
+        let mut given = of(&Config { rate: Rate::Given, ..by_errors.clone() });
+        // From few samples a cycle to many, until more are shaded.
+        let mut found = vec![];
+        for rate in [0.0625, 0.125, 0.25, 0.5, 1.0, 2.0, 4.0] {
+            let predicted = Config { samples_per_cycle: Some(rate), ..config(extent, Estimator::Mis, 64) };
+            given.set_levels(&oracle::predicted(&world, &predicted, &device, 3).unwrap()).unwrap();
+            found.push(worth(&mut given, &converged));
+        }
+        // Between the two that shade about as many.
+        let at = found.windows(2).find(|pair| pair[0][0] <= shaded && shaded <= pair[1][0]);
+        let by_bandwidth = at.map(|pair| {
+            let part = (shaded - pair[0][0]) / (pair[1][0] - pair[0][0]).max(1e-9);
+            pair[0][1] + (pair[1][1] - pair[0][1]) * part
+        });
+        println!(
+            "{mesh}, {name}, {light}: errors shade {shaded:.3} for {psnr:.1} dB; bandwidth {found:.3?}, as many {by_bandwidth:.1?}"
+        );
+        gains.extend(by_bandwidth.map(|other| psnr - other));
+    }
+    gains.sort_by(f64::total_cmp);
+    println!("what errors gain over bandwidth, dB: {gains:.1?}");
+    assert!(gains.len() > 1 && gains[0] > 0.0, "{gains:?}");
 }

@@ -4,20 +4,25 @@
 #[path = "support/chosen_device.rs"]
 mod chosen_device;
 mod support {
+    pub mod filters;
     pub mod frames;
     pub mod statistics;
 }
 
+use chosen_device::DEVICE;
 use glam::{DQuat, DVec2, DVec3, Mat4};
 use passband::offline::builtin;
+use passband::offline::headless::{Headless, Options};
 use passband::offline::reference::Reference;
 use passband::offline::scene::Scene;
+use passband::offline::session::Session;
 use passband::offline::world::World;
 use passband::reflectance::{Model, Reflectance};
 use passband::sampling::LatLong;
-use passband::{Config, Estimator, Rate};
+use passband::{Config, Estimator, Filter, Maps, Rate, Requirements};
 use rayon::prelude::*;
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
+use support::filters;
 use support::frames::{Expected, Image, Stage, config, expected, furthest, ggx, ratio, table, tiles, world};
 use support::statistics::Mean;
 
@@ -277,6 +282,32 @@ fn a_sun_in_a_mirror_has_its_shape() {
     let error = (difference / all).sqrt();
     println!("relative to all light: {error:.5}");
     assert!(error < 5e-3, "{error}");
+}
+
+/// Some drivers end loops after so many rounds without a word: what would be cut short is refused, and the most that is not is whole.
+#[test]
+fn no_direction_is_left_out() {
+    let mut bumps = filters::scene("sphere", filters::lobes(&[(0.0, 60.0), (0.2, 90.0), (-0.2, 20.0)]), Maps::default());
+    bumps.materials[0].maps.normal = filters::normals([64; 2], 0.4);
+    let ball = world("sphere", 32, table("satin"), sky("constant"));
+    for (world, filter) in [(&ball, Filter::Point), (&bumps, Filter::Point), (&bumps, Filter::Vmf8), (&bumps, Filter::Lean)] {
+        let of = |directions| Config { filter, ..config([16, 12], Estimator::Mis, directions) };
+        let mean = |directions| -> Result<f64, String> {
+            let headless =
+                Headless::new(&Options { device: Some(DEVICE.into()), validate: true }, &Requirements::of(&of(directions)));
+            let mut session = Session::new(headless.unwrap(), world, &of(directions)).unwrap();
+            session.frame([1, 0]).map_err(|e| e.to_string())?;
+            let texels: Vec<[f32; 4]> = bytemuck::pod_collect_to_vec(&session.image("resolved").unwrap().0);
+            Ok(texels.iter().flat_map(|t| &t[..3]).map(|c| f64::from(*c)).sum())
+        };
+        // Another driver may draw them all.
+        let Err(said) = mean(65536) else { continue };
+        let most: u32 = said.split("at most ").nth(1).unwrap().split(' ').next().unwrap().parse().unwrap();
+        assert!(said.contains("Config::directions") && most > 1000 && mean(most + most / 100).is_err(), "{said}");
+        let [whole, less] = [most, most / 8].map(|directions| mean(directions).unwrap());
+        println!("{filter:?}: at most {most} directions, {:.1e} from what an eighth of them is", whole / less - 1.0);
+        assert!((whole / less - 1.0).abs() < 0.01, "{filter:?}: {whole} {less}");
+    }
 }
 
 #[test]

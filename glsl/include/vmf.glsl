@@ -53,21 +53,23 @@ float vmf_literal_spread(float kappa) {
     return e;
 }
 
+// One of Newton's steps towards the concentration of spread s, 1 less r.
+float vmf_newton(float kappa, float s, float r) {
+    float square = kappa * kappa, e = exp(-2.0 * kappa), rest = 1.0 - e;
+    bool series = kappa < VMF_SERIES_BELOW;
+    float off = series ? vmf_mean_cosine_series(kappa) - r : s - (1.0 / kappa - 2.0 * e / rest);
+    float slope = series ? 1.0 / 3.0 - square * (1.0 / 15.0 - square * (2.0 / 189.0 - square * (1.0 / 675.0 - square * (2.0 / 10395.0))))
+                         : 1.0 / square - 4.0 * e / (rest * rest);
+    return kappa - off / slope;
+}
+
 // The concentration of a lobe of this spread, which is clamped to at least VMF_LEAST_SPREAD and at most 1: Banerjee's estimate
 // (within 5 %) and two Newton steps, each of which squares the relative error.
 float vmf_concentration(float spread) {
     float s = clamp(spread, VMF_LEAST_SPREAD, 1.0);
     float r = 1.0 - s;
     float kappa = r * (3.0 - r * r) / (s * (2.0 - s));
-    for (int i = 0; i < 2; i++) {
-        float square = kappa * kappa, e = exp(-2.0 * kappa), rest = 1.0 - e;
-        bool series = kappa < VMF_SERIES_BELOW;
-        float off = series ? vmf_mean_cosine_series(kappa) - r : s - (1.0 / kappa - 2.0 * e / rest);
-        float slope = series ? 1.0 / 3.0 - square * (1.0 / 15.0 - square * (2.0 / 189.0 - square * (1.0 / 675.0 - square * (2.0 / 10395.0))))
-                             : 1.0 / square - 4.0 * e / (rest * rest);
-        kappa -= off / slope;
-    }
-    return kappa;
+    return vmf_newton(vmf_newton(kappa, s, r), s, r);
 }
 
 // The concentration of what becomes a lobe of kappa by a blur of this variance, in squared radians along each of two axes: mean

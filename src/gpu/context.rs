@@ -27,19 +27,23 @@ pub(crate) struct Context {
     pub pipeline_cache: vk::PipelineCache,
     pub debug_utils: Option<ash::ext::debug_utils::Device>,
     pub limits: vk::PhysicalDeviceLimits,
+    /// Rounds of loops after which the driver ends all loops of an invocation without a word, if it does: Mesa's llvmpipe
+    /// (`LP_MAX_TGSI_LOOP_ITERATIONS`, "shared between every loop").
+    pub most_rounds: Option<u64>,
     /// Valid bits of the queue family's timestamps; 0 where it has none.
     pub timestamp_bits: u32,
 }
 
 impl Context {
     pub fn new(host: &Host<'_>) -> Result<Self> {
+        let mut driver = vk::PhysicalDeviceDriverProperties::default();
+        let mut properties = vk::PhysicalDeviceProperties2::default().push_next(&mut driver);
         // SAFETY: the host guarantees that its instance and physical device are alive.
-        let (properties, families) = unsafe {
-            (
-                host.instance.get_physical_device_properties(host.physical_device),
-                host.instance.get_physical_device_queue_family_properties(host.physical_device),
-            )
+        let families = unsafe {
+            host.instance.get_physical_device_properties2(host.physical_device, &mut properties);
+            host.instance.get_physical_device_queue_family_properties(host.physical_device)
         };
+        let limits = properties.properties.limits;
         let family = families
             .get(host.queue_family as usize)
             .ok_or_else(|| Error::invalid("Host::queue_family", format!("below {}", families.len()), host.queue_family))?;
@@ -55,7 +59,8 @@ impl Context {
             device: host.device.clone(),
             pipeline_cache: host.pipeline_cache,
             debug_utils: host.debug_utils.cloned(),
-            limits: properties.limits,
+            limits,
+            most_rounds: (driver.driver_id == vk::DriverId::MESA_LLVMPIPE).then_some(65_535),
             timestamp_bits: family.timestamp_valid_bits,
         })
     }

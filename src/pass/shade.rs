@@ -2,8 +2,8 @@
 
 use crate::config::{Config, Estimator};
 use crate::distribution::Filter;
-use crate::error::Result;
-use crate::frequency::allocation::Allocation;
+use crate::error::{Error, Result};
+use crate::frequency::allocation::{self, Allocation};
 use crate::gpu::access::Access;
 use crate::gpu::buffer::Buffer;
 use crate::gpu::image::Image;
@@ -123,6 +123,39 @@ pub(crate) fn lobe_constants(config: &Config, kinds: Kinds) -> [u32; 8] {
 pub(crate) fn offset(mean: f64, lights: &[Light]) -> f32 {
     const LITTLE: f64 = 0.02;
     lights.iter().map(Light::sampled_radiance).sum::<f32>() + (LITTLE * mean).max(1e-6) as f32
+}
+
+/// Rounds of loops that a sample with these directions takes at most, of materials of these kinds and so many area lights. Loops
+/// that are unrolled are none.
+fn rounds(config: &Config, kinds: Kinds, directions: Directions, area_lights: u32) -> u64 {
+    // A loop takes one round more than it has steps.
+    let layers = config.filter.lobe_layers() / if config.filter.has_slopes() { 2 } else { 1 };
+    let found = if layers > 0 { u64::from(layers) + 1 } else { 0 };
+    let own = u64::from(kinds.most_own_lobes.saturating_sub(2)) + 1;
+    let lights = if area_lights > 0 { u64::from(area_lights) + 1 } else { 0 };
+    // Four texels of two levels for each lobe that is looked up.
+    let exact = if config.exact_lobes && config.estimator.has_residual() { 10 * u64::from(kinds.most_lobes) } else { 0 };
+    let evaluated = 1 + found + own + exact;
+    let [brdf, environment, light] = [directions.brdf, directions.environment, directions.light * area_lights].map(u64::from);
+    brdf * (evaluated + 2 * found + lights) + (environment + light) * evaluated
+}
+
+/// Refuses more directions than a driver has rounds for that ends loops after `most` of them
+/// ([`Context::most_rounds`](crate::gpu::context::Context::most_rounds)).
+pub(crate) fn check_rounds(most: Option<u64>, config: &Config, kinds: Kinds, environment: bool, area_lights: u32) -> Result<()> {
+    let Some(most) = most else { return Ok(()) };
+    let directions = match config.allocation {
+        Allocation::Constant => Directions::of(config, environment, area_lights),
+        _ => Directions::split(config, allocation::MOST.max(config.directions), environment, area_lights),
+    };
+    let needed = rounds(config, kinds, directions, area_lights);
+    if needed <= most {
+        return Ok(());
+    }
+    let fits = u64::from(config.directions) * most / needed;
+    let expected =
+        format!("at most {fits} with these materials, lights and filter on this driver, which ends loops after {most} rounds");
+    Err(Error::invalid("Config::directions", expected, config.directions))
 }
 
 impl Shade {
