@@ -179,7 +179,8 @@ int predict(uint entry) {
         uv.x -= frame.environment.x;
         float radiance = luminance(environment_fetch(uv).rgb);
         Reflected r = reflected(s, wi, h);
-        per_density = lobed(s) ? 1.0 / r.density : per_density;
+        // Of a direction that none is drawn in the density may be 0.
+        per_density = above ? (lobed(s) ? 1.0 / max(r.density, 1e-30) : per_density) : 0.0;
         float light = textureLod(environment_bandwidth, uv, 0.0).x;
         float b = image_bandwidth(OPERATOR, light, r.lobe, curvatures, distance, f.view.z, angle);
         add(sums, b, above ? radiance : 0.0, above ? r.luminance : 0.0, per_density);

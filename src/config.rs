@@ -117,7 +117,8 @@ impl Bins {
 /// The level of shading as an attachment of `VK_KHR_fragment_shading_rate`, for hosts that shade with the hardware's rate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ShadingRate {
-    /// Pixels that a texel stands for, powers of two from 4 to 64: within the device's minimum and maximum.
+    /// Pixels that a texel stands for, powers of two from 4 to 64: within the device's minimum, maximum and aspect ratio, which the
+    /// host knows.
     pub texel: [u32; 2],
     /// The coarsest rate that is asked for: 0 is a pixel; 1 is 2x2, which every device with the extension has; 2 is 4x4.
     pub coarsest: u32,
@@ -186,7 +187,8 @@ pub struct Config {
     pub lobe_rule: Rule,
     /// Whether the mesh's curvature widens lobes as [`Filter::Tk`] does, whatever the filter.
     pub geometric: bool,
-    /// Directions a shaded sample, 1 to 65536; at least 2 where [`Estimator`] combines two kinds. Where [`Rate::Bandwidth`] chooses among several
+    /// Directions a shaded sample, 1 to 65536, or as many as [`Renderer::record`](crate::Renderer::record) says on drivers that end loops
+    /// early (Mesa's llvmpipe: some 32700, and fewer with lobes, lights or several samples a pixel); at least 2 where [`Estimator`] combines two kinds. Where [`Rate::Bandwidth`] chooses among several
     /// samples a pixel, whatever stands for a pixel or more gets [`Config::samples_per_side`] times as many, and each finer level a
     /// quarter of the level above.
     pub directions: u32,

@@ -85,8 +85,9 @@ pub struct FrameInputs<'a> {
     /// counts as that.
     pub levels: Option<ImageRef>,
     /// With [`Config::shading_rate`]: an image of [`shading_rate::FORMAT`](crate::pass::shading_rate::FORMAT) with a texel for each
-    /// [`ShadingRate::texel`](crate::ShadingRate::texel) pixels, rounded up, to which a transfer writes between its entry and exit. Each is the
-    /// finest level of the pixels that it stands for, as `VK_KHR_fragment_shading_rate` has it.
+    /// [`ShadingRate::texel`](crate::ShadingRate::texel) pixels, rounded up, to whose level 0 and layer 0 a transfer writes between its entry and exit; its view
+    /// is not used. Each is the finest level of the surfaces that it stands for, as `VK_KHR_fragment_shading_rate` has it, or the
+    /// coarsest that there can be.
     pub shading_rate: Option<ImageRef>,
     /// Seed and frame number of the sample points.
     pub seed: [u32; 2],

@@ -10,7 +10,7 @@ use crate::pass::maps::{MapsUpload, Uses};
 use crate::pass::{PassContext, bandwidth, base, filter, shade};
 use crate::reflectance::Model;
 
-/// What passes are compiled for. Other materials of the same kinds need no other ones.
+/// What passes are compiled for, and what bounds their loops. Other materials of the same kinds need no other ones.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Kinds {
     /// Some whose lobes stay as they are, whatever the filter.

@@ -73,10 +73,7 @@ impl Passes {
             residual_level: by_fits.then(|| residual_level::ResidualLevel::new(&mut p, config)).transpose()?,
             luminance: (top > 0 && config.rate == Rate::Luminance).then(|| luminance::Luminance::new(&mut p)).transpose()?,
             pyramid: (top > 0).then(|| pyramid::Pyramid::new(&mut p, top)).transpose()?,
-            shading_rate: config
-                .shading_rate
-                .map(|rate| shading_rate::RatePass::new(&mut p, rate, config.samples_per_side))
-                .transpose()?,
+            shading_rate: config.shading_rate.map(|rate| shading_rate::RatePass::new(&mut p, rate, config)).transpose()?,
             classify: drawn.then(|| classify::Classify::new(&mut p, top, predicted)).transpose()?,
             allocate: allocated.then(|| allocate::Allocate::new(&mut p, config)).transpose()?,
             upsample: (top > 0).then(|| upsample::Upsample::new(&mut p, top)).transpose()?,

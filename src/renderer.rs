@@ -124,7 +124,8 @@ impl Renderer {
     ///
     /// # Errors
     /// [`Error::CallOrder`] before an environment and materials were recorded; [`Error::InvalidInput`] for inputs that do
-    /// not fit the configuration, with nothing recorded then except the timer's reset.
+    /// not fit the configuration, with nothing recorded then except the timer's reset; and for more directions, with these materials and lights,
+    /// than a driver has rounds of loops for.
     ///
     /// # Safety
     /// `cmd` is recording outside a render pass on the queue family of [`Host`]; command buffers are submitted in the order
@@ -148,7 +149,7 @@ impl Renderer {
         let (records, counts) = light::records(inputs.lights);
         let [exact, area] = counts;
         let lit = inputs.environment.intensity > 0.0;
-        shade::check_rounds(self.cx.most_rounds, &self.config, of_kinds.kinds, lit, area)?;
+        shade::check_rounds(self.cx.most_rounds, &self.config, of_kinds.kinds, lit, counts)?;
         if let Some(timings) = self.timer.begin_frame(&self.cx, cmd, inputs.slot)? {
             self.timings = Some(timings);
         }

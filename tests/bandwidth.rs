@@ -22,6 +22,7 @@ use passband::frequency::reconstruction::{self as twin, Pyramid};
 use passband::offline::builtin;
 use passband::offline::metrics::{Exposure, Pair, Picture, compare};
 use passband::offline::world::World;
+use passband::reflectance::{BlinnPhong, Model};
 use passband::sampling::LatLong;
 use passband::{Config, Estimator, Filter, Light, Maps, Rate, Texture};
 use prediction::{Frame, Twin};
@@ -164,6 +165,24 @@ fn the_lobes_of_a_pixel_are_what_is_predicted_from() {
     for filter in [Filter::Vmf1, Filter::Vmf8] {
         let config = Config { filter, samples_per_cycle: Some(0.5), ..predicted([96, 80], 64) };
         against_the_twin(&bumps, &config, &[(Operator::Clipped, Combine::Mean)]);
+    }
+    // Metals of every kind of lobes, of which some directions have no density at all: hardly a block goes without a prediction.
+    let metals = [
+        ggx(0.1, DVec3::new(0.9, 0.5, 0.4), DVec3::ZERO),
+        Model::BlinnPhong(BlinnPhong { exponent: 900.0, specular: DVec3::ONE, albedo: DVec3::ZERO }),
+        filters::lobes(&[(0.0, 800.0), (0.3, 500.0)]),
+    ];
+    for model in metals {
+        bumps.materials[0].model = model;
+        for filter in [Filter::Lean, Filter::Leadr, Filter::Vmf8, Filter::Clusters] {
+            let config = Config { filter, samples_per_cycle: Some(0.5), curvature: true, ..predicted([64, 48], 64) };
+            let mut session = session(&bumps, &config);
+            session.frame([9, 3]).unwrap();
+            let frame = Frame::read(&mut session);
+            let seen: Vec<_> = frame.prediction.iter().filter(|p| p[3] > 0.0).collect();
+            let varies = seen.iter().filter(|p| p[0] > 0.0 && p[0].is_finite() && p[1].is_finite()).count();
+            assert!(seen.len() > 100 && varies * 100 > seen.len() * 85, "{filter:?}: {varies} of {}", seen.len());
+        }
     }
 }
 

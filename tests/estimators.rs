@@ -19,7 +19,7 @@ use passband::offline::session::Session;
 use passband::offline::world::World;
 use passband::reflectance::{Model, Reflectance};
 use passband::sampling::LatLong;
-use passband::{Config, Estimator, Filter, Maps, Rate, Requirements};
+use passband::{Config, Estimator, Filter, Light, Maps, Rate, Requirements};
 use rayon::prelude::*;
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use support::filters;
@@ -253,7 +253,8 @@ fn looked_up_light_changes_no_mean_on_six_scenes() {
     for (mesh, name, model, light) in scenes {
         let world = world(mesh, 64, model, sky(light));
         let of = |estimator, exact_lobes, seed, count| {
-            Frames::new(&world, &Config { exact_lobes, ..config([128, 128], estimator, 256) }, seed, count)
+            // As many directions as the exact mode has rounds for on lavapipe.
+            Frames::new(&world, &Config { exact_lobes, ..config([128, 128], estimator, 192) }, seed, count)
         };
         let plain = of(Estimator::Mis, false, 1, 64);
         let [beyond, exact, error] = of(Estimator::Cv, true, 2, 16).beside(&plain);
@@ -263,9 +264,8 @@ fn looked_up_light_changes_no_mean_on_six_scenes() {
         );
         worst = [worst[0].max(beyond.abs()), worst[1].max(exact.abs()), worst[2].max(in_frames.abs())];
     }
-    // Aims: 0.1 dB, 5e-4 (both missed in one scene each, as docs/residual.md says) and 2e-3.
     let [beyond, exact, in_frames] = worst;
-    assert!(beyond < 0.2 && exact < 2e-3 && in_frames < 2e-3, "{worst:?}");
+    assert!(beyond < 0.1 && exact < 5e-4 && in_frames < 2e-3, "{worst:?}");
 }
 
 /// Lobes about as narrow as the sun show its shape, which is that of its texels as they are looked up: as one point it is off by
@@ -289,7 +289,9 @@ fn a_sun_in_a_mirror_has_its_shape() {
 fn no_direction_is_left_out() {
     let mut bumps = filters::scene("sphere", filters::lobes(&[(0.0, 60.0), (0.2, 90.0), (-0.2, 20.0)]), Maps::default());
     bumps.materials[0].maps.normal = filters::normals([64; 2], 0.4);
-    let ball = world("sphere", 32, table("satin"), sky("constant"));
+    let mut ball = world("sphere", 32, table("satin"), sky("constant"));
+    let light = |x: f32| Light::Directional { direction: [x, -1.0, -0.4], irradiance: [1.0, 2.0, 3.0] };
+    ball.lights = [-0.4, 0.1, 0.5].map(light).into();
     for (world, filter) in [(&ball, Filter::Point), (&bumps, Filter::Point), (&bumps, Filter::Vmf8), (&bumps, Filter::Lean)] {
         let of = |directions| Config { filter, ..config([16, 12], Estimator::Mis, directions) };
         let mean = |directions| -> Result<f64, String> {
@@ -300,10 +302,17 @@ fn no_direction_is_left_out() {
             let texels: Vec<[f32; 4]> = bytemuck::pod_collect_to_vec(&session.image("resolved").unwrap().0);
             Ok(texels.iter().flat_map(|t| &t[..3]).map(|c| f64::from(*c)).sum())
         };
-        // Another driver may draw them all.
-        let Err(said) = mean(65536) else { continue };
+        let said = match mean(65536) {
+            Err(said) => said,
+            // Another driver draws them all.
+            Ok(all) => {
+                let few = mean(8192).unwrap();
+                assert!((all / few - 1.0).abs() < 0.01, "{filter:?}: {all} {few}");
+                continue;
+            }
+        };
         let most: u32 = said.split("at most ").nth(1).unwrap().split(' ').next().unwrap().parse().unwrap();
-        assert!(said.contains("Config::directions") && most > 1000 && mean(most + most / 100).is_err(), "{said}");
+        assert!(said.contains("Config::directions") && most > 1000 && mean(most + 1).is_err(), "{said}");
         let [whole, less] = [most, most / 8].map(|directions| mean(directions).unwrap());
         println!("{filter:?}: at most {most} directions, {:.1e} from what an eighth of them is", whole / less - 1.0);
         assert!((whole / less - 1.0).abs() < 0.01, "{filter:?}: {whole} {less}");

@@ -87,7 +87,7 @@ impl std::str::FromStr for Aov {
     }
 }
 
-/// What [`Aov::ShadingRate`] asks for: what most devices have.
+/// What [`Aov::ShadingRate`] asks for.
 pub const SHADING_RATE: ShadingRate = ShadingRate { texel: [16, 16], coarsest: 2 };
 
 /// A channel of a layered image: its name and row-major samples.

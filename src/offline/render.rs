@@ -26,6 +26,8 @@ pub(crate) const WARM_UP: u32 = 2;
 pub(super) const TIMED: u32 = 5;
 /// Directions of one frame of a reference: independent frames are averaged, so that no single dispatch runs for minutes.
 const REFERENCE_CHUNK: u32 = 1024;
+/// The same where the filter finds lobes, of which drivers may not have rounds for more.
+const REFERENCE_CHUNK_OF_LOBES: u32 = 256;
 
 /// What to render.
 #[derive(Clone)]
@@ -57,11 +59,15 @@ impl Settings {
         Self { config, oracle: false, seed: 0, aovs, reference: None, supersample: None, timed: false, device }
     }
 
+    fn reference_chunk(&self) -> u32 {
+        if self.config.filter.lobe_layers() > 0 { REFERENCE_CHUNK_OF_LOBES } else { REFERENCE_CHUNK }
+    }
+
     /// Frames of the renderer, of [`open`]'s configuration, that make one image.
     pub(super) fn chunks(&self, config: &Config) -> u32 {
         match (self.supersample, self.reference) {
             (Some(samples), _) => supersample::frames(self, config, samples),
-            (None, Some(directions)) => directions.div_ceil(REFERENCE_CHUNK),
+            (None, Some(directions)) => directions.div_ceil(self.reference_chunk()),
             (None, None) => 1,
         }
     }
@@ -82,7 +88,7 @@ impl Settings {
         };
         let Some(directions) = self.reference else { return base };
         let (rate, estimator, allocation) = (Rate::Full, Estimator::Mis, Allocation::Constant);
-        Config { rate, estimator, allocation, shading_rate: None, directions: directions.min(REFERENCE_CHUNK), ..base }
+        Config { rate, estimator, allocation, shading_rate: None, directions: directions.min(self.reference_chunk()), ..base }
     }
 
     /// As `--rate` calls it.

@@ -125,37 +125,60 @@ pub(crate) fn offset(mean: f64, lights: &[Light]) -> f32 {
     lights.iter().map(Light::sampled_radiance).sum::<f32>() + (LITTLE * mean).max(1e-6) as f32
 }
 
-/// Rounds of loops that a sample with these directions takes at most, of materials of these kinds and so many area lights. Loops
-/// that are unrolled are none.
-fn rounds(config: &Config, kinds: Kinds, directions: Directions, area_lights: u32) -> u64 {
-    // A loop takes one round more than it has steps.
+/// Rounds of loops that evaluating a reflectance takes, and one loop over the lobes that the filter found. A loop takes one round more
+/// than it has steps; those that are unrolled take none.
+fn rounds_of(config: &Config, kinds: Kinds) -> [u64; 2] {
     let layers = config.filter.lobe_layers() / if config.filter.has_slopes() { 2 } else { 1 };
     let found = if layers > 0 { u64::from(layers) + 1 } else { 0 };
-    let own = u64::from(kinds.most_own_lobes.saturating_sub(2)) + 1;
-    let lights = if area_lights > 0 { u64::from(area_lights) + 1 } else { 0 };
-    // Four texels of two levels for each lobe that is looked up.
-    let exact = if config.exact_lobes && config.estimator.has_residual() { 10 * u64::from(kinds.most_lobes) } else { 0 };
-    let evaluated = 1 + found + own + exact;
-    let [brdf, environment, light] = [directions.brdf, directions.environment, directions.light * area_lights].map(u64::from);
-    brdf * (evaluated + 2 * found + lights) + (environment + light) * evaluated
+    [u64::from(kinds.most_own_lobes.saturating_sub(2)) + 1 + found, found]
 }
 
-/// Refuses more directions than a driver has rounds for that ends loops after `most` of them
+/// The most rounds of a sample with these directions, of materials of these kinds, so many exact and so many area lights.
+fn rounds(config: &Config, kinds: Kinds, directions: Directions, [exact, area]: [u32; 2]) -> u64 {
+    /// Suns, and what shows their shapes.
+    const SUNS: u64 = 8;
+    const POINTS: u64 = 64;
+    let [evaluated, found] = rounds_of(config, kinds);
+    let residual = config.estimator.has_residual();
+    // Lobe by lobe, which is too much to unroll, the four texels of two levels.
+    let texels = if config.exact_lobes && residual { 11 * u64::from(kinds.most_lobes) + 1 } else { 0 };
+    let lights = if exact + area > 0 { u64::from(area) + 1 } else { 0 };
+    let suns = if config.residual_is_factor() { SUNS * (u64::from(kinds.most_lobes) + 2 + POINTS * (evaluated + 1)) } else { 0 };
+    let once = 2 * (u64::from(kinds.most_own_lobes) + found) + u64::from(exact + 1) * (evaluated + 1) + 2 * lights + suns + 8;
+    let each = 1 + evaluated + texels;
+    let [brdf, environment, light] = [directions.brdf, directions.environment, directions.light * area].map(u64::from);
+    once + brdf * (each + 2 * found + lights) + (environment + light) * each
+}
+
+/// Refuses more directions, probes or lights than a driver has rounds for that ends loops after `most` of them
 /// ([`Context::most_rounds`](crate::gpu::context::Context::most_rounds)).
-pub(crate) fn check_rounds(most: Option<u64>, config: &Config, kinds: Kinds, environment: bool, area_lights: u32) -> Result<()> {
+pub(crate) fn check_rounds(most: Option<u64>, config: &Config, kinds: Kinds, lit: bool, lights: [u32; 2]) -> Result<()> {
     let Some(most) = most else { return Ok(()) };
-    let directions = match config.allocation {
-        Allocation::Constant => Directions::of(config, environment, area_lights),
-        _ => Directions::split(config, allocation::MOST.max(config.directions), environment, area_lights),
+    let said = |most_that_fit: String| {
+        format!("{most_that_fit} with these materials, lights and filter on this driver, which ends loops after {most} rounds")
     };
-    let needed = rounds(config, kinds, directions, area_lights);
-    if needed <= most {
-        return Ok(());
+    let needed = |directions: u32| {
+        let each = config.directions_a_pixel() / config.directions.max(1);
+        rounds(config, kinds, Directions::split(config, directions.saturating_mul(each), lit, lights[1]), lights)
+    };
+    if config.estimator != Estimator::Preconvolved && needed(config.directions) > most {
+        let (mut fits, mut step) = (0, 1 << 16);
+        while step > 0 {
+            fits += if needed(fits + step) <= most { step } else { 0 };
+            step /= 2;
+        }
+        return Err(Error::invalid("Config::directions", said(format!("at most {fits}")), config.directions));
     }
-    let fits = u64::from(config.directions) * most / needed;
-    let expected =
-        format!("at most {fits} with these materials, lights and filter on this driver, which ends loops after {most} rounds");
-    Err(Error::invalid("Config::directions", expected, config.directions))
+    if config.allocation != Allocation::Constant && needed(allocation::MOST) > most {
+        let expected = said(format!("constant, as others give samples up to {} directions", allocation::MOST));
+        return Err(Error::invalid("Config::allocation", expected, config.allocation.name()));
+    }
+    let [evaluated, found] = rounds_of(config, kinds);
+    let predicted = (u64::from(config.probes) + u64::from(lights[0] + lights[1])) * (1 + evaluated + 3 * found) + 4 * found + 64;
+    if config.predicts() && predicted > most {
+        return Err(Error::invalid("Config::probes", said("fewer".into()), config.probes));
+    }
+    Ok(())
 }
 
 impl Shade {

@@ -1,7 +1,7 @@
 //! Pass 5, continued: the level as a shading-rate attachment, for hosts that shade with the hardware's rate
 //! (`VK_KHR_fragment_shading_rate`).
 
-use crate::config::ShadingRate;
+use crate::config::{Config, ShadingRate};
 use crate::error::{Error, Result};
 use crate::gpu::access::{Access, ImageRef};
 use crate::gpu::buffer::Buffer;
@@ -82,8 +82,10 @@ pub(crate) struct RatePass {
 }
 
 impl RatePass {
-    /// For frames of `side` samples a side of a pixel.
-    pub fn new(p: &mut PassContext<'_, '_>, rate: ShadingRate, side: u32) -> Result<Self> {
+    /// Rates as coarse as `rate` and the levels of `config` are.
+    pub fn new(p: &mut PassContext<'_, '_>, rate: ShadingRate, config: &Config) -> Result<Self> {
+        let side = config.samples_per_side;
+        let rate = ShadingRate { coarsest: rate.coarsest.min(config.coarsest().saturating_sub(side.ilog2())), ..rate };
         let pipeline = ComputePipeline::new(p.build, p.modules, &INTERFACE, p.bridge, p.slots, &[])?;
         Ok(Self { pipeline, rate, side })
     }

@@ -151,17 +151,20 @@ pub fn lobe_cycles(kappa: f64) -> f64 {
 /// Concentration that stands for a cosine over the horizon.
 const COSINE: f64 = 2.0;
 
-/// Cycles/radian about the light direction `wi` (unit, z the normal) where the reflectance is `lobes`, as a filter finds them, and a
-/// diffuse part in 1/sr: the mean over them by what each reflects from there. Twin of `glsl/include/found_bandwidth.glsl`.
-pub fn found(lobes: &[ReflectedLobe], diffuse: f64, wi: DVec3) -> f64 {
-    let diffuse = (diffuse * wi.z, lobe_cycles(COSINE));
-    let share = |l: &ReflectedLobe| {
+/// Cycles/radian about the light direction `wi` (unit, z the normal) where the reflectance is `lobes`, as a filter finds them, each with how many
+/// times narrower than its concentration says it is across its axis, and a diffuse part in 1/sr: the mean over them by what each
+/// reflects from there, or that of the narrowest. Twin of `glsl/include/found_bandwidth.glsl`.
+pub fn found(lobes: &[(ReflectedLobe, f64)], diffuse: f64, wi: DVec3) -> f64 {
+    let share = |(l, narrower): &(ReflectedLobe, f64)| {
         let height = vmf::normalisation(l.kappa) * (-0.5 * l.kappa * (wi - l.direction).length_squared()).exp();
-        (l.weight.element_sum() / 3.0 * height, lobe_cycles(l.kappa))
+        (l.weight.element_sum() / 3.0 * height, lobe_cycles(l.kappa) * narrower)
     };
-    let (sum, weights) =
-        lobes.iter().map(share).chain([diffuse]).fold((0.0, 0.0), |(s, w), (weight, c)| (s + weight * c, w + weight));
-    if weights > 0.0 { sum / weights } else { 0.0 }
+    let each: Vec<_> = lobes.iter().map(share).chain([(diffuse * wi.z, lobe_cycles(COSINE))]).collect();
+    let weights: f64 = each.iter().map(|(weight, _)| weight).sum();
+    match weights > 0.0 {
+        true => each.iter().map(|(weight, cycles)| weight * cycles).sum::<f64>() / weights,
+        false => each[..lobes.len()].iter().map(|(_, cycles)| *cycles).fold(0.0, f64::max),
+    }
 }
 
 /// Theta of the viewer of tile `angle`.

@@ -129,7 +129,7 @@ impl Found {
             let value = ci * masking(ci) * masking(co) * kappa / TAU * lobe.weight / vmf::normalisation(narrow);
             ReflectedLobe { direction, kappa: narrow, weight: schlick(self.material.f0, cosine) * value }
         };
-        let lobes: Vec<_> = self.lobes.iter().zip(&self.normals).map(reflected).collect();
+        let lobes: Vec<_> = self.lobes.iter().zip(&self.normals).map(reflected).map(|lobe| (lobe, 1.0)).collect();
         let below = DVec3::ONE - schlick(self.material.f0, (0.5 + 0.5 * wo.z).sqrt());
         let diffuse = self.material.albedo * below / PI;
         passband::reflectance::bandwidth::found(&lobes, diffuse.element_sum() / 3.0, wi)

@@ -144,7 +144,10 @@ impl<'a> Twin<'a> {
         let layers = if config.filter.lobe_layers() > 0 { frame.lobes.chunks_exact(frame.ids.len()) } else { [].chunks_exact(1) };
         let found = match material.model {
             Model::Ggx(ggx) => Found::unpack(layers.map(|layer| layer[at]), &local, ggx),
-            _ => None,
+            _ => {
+                assert!(config.filter.lobe_layers() == 0, "no twin for the lobes of this material");
+                None
+            }
         };
         let evaluate = |wi| found.as_ref().map_or_else(|| reflectance.evaluate(wi, wo), |f| f.evaluate(wi, wo));
         let lobe_at = |wi| found.as_ref().map_or_else(|| lobes.at(wi, wo), |f| f.bandwidth(wi, wo));
