@@ -68,6 +68,7 @@ pub fn interfaces() -> Vec<Interface> {
     all.extend(classify::INTERFACES);
     all.extend(allocate::INTERFACES);
     all.extend([residual_level::INTERFACE, base::INTERFACE, shade::INTERFACE, upsample::INTERFACE, resolve::INTERFACE]);
+    all.push(shading_rate::INTERFACE);
     all.extend(tonemap::INTERFACES);
     all.extend(environment_bandwidth::INTERFACES);
     all.extend(luminance::INTERFACES);
