@@ -17,7 +17,6 @@ layout(constant_id = 2) const bool KERNEL = false;
 #include "shadows.glsl"
 #define LOBES_BINDING 14
 #include "lobes.glsl"
-#include "found_bandwidth.glsl"
 #include "curvature.glsl"
 #include "bandwidth.glsl"
 #include "lobe_bandwidth.glsl"
@@ -40,6 +39,8 @@ layout(constant_id = 3) const bool LOCAL_LIGHTS = false;
 layout(constant_id = 4) const int ALLOCATION = ALLOCATION_CONSTANT;
 // Where the filter finds lobes: whether there are materials beside, which stay as they are.
 layout(constant_id = 10) const uint UNFILTERED = 1u;
+#include "surface.glsl"
+#include "found_bandwidth.glsl"
 
 layout(set = 2, binding = 4) uniform usampler2D factors;
 layout(set = 2, binding = 5) uniform sampler2D environment_bandwidth; // cycles/radian
@@ -103,14 +104,6 @@ void add(inout Sums s, float bandwidth, float radiance, float reflected, float p
     s.squares += weight * weight;
 }
 
-// What the surface does with light.
-struct Surface {
-    int id;
-    Material material;
-    Lobes lobes;
-    vec3 view;
-};
-
 // Of light from local wi above the horizon, h the half vector.
 struct Reflected {
     float luminance; // reflectance times the cosine
@@ -118,19 +111,17 @@ struct Reflected {
     float density;   // per steradian, with which lobes are drawn from
 };
 
-bool lobed(Surface s) {
-    return LOBED != 0u && (s.lobes.count > 0u || UNFILTERED == 0u);
-}
-
-Reflected reflected(Surface s, vec3 wi, vec3 h) {
+// `id` is of the surface's material.
+Reflected reflected(Surface s, uint id, vec3 wi, vec3 h) {
     Reflected r = Reflected(0.0, 0.0, 0.0);
+    vec3 wo = s.frame.view;
     if (UNFILTERED != 0u) {
-        r.luminance = luminance(material_evaluate(s.material, wi, s.view, h)) * wi.z;
-        r.lobe = texelFetch(lobe_bandwidths, lobe_bandwidth_texel(s.id, wi, s.view), 0).x * s.material.sharpness;
+        r.luminance = luminance(material_evaluate(s.material, wi, wo, h)) * wi.z;
+        r.lobe = texelFetch(lobe_bandwidths, lobe_bandwidth_texel(int(id), wi, wo), 0).x * s.material.sharpness;
     }
     if (LOBED != 0u) {
-        vec4 value = lobes_evaluate(s.material, s.lobes, wi, s.view, h);
-        float found = found_bandwidth(s.material, s.lobes, wi, s.view);
+        vec4 value = lobes_evaluate(s.material, s.lobes, wi, wo, h);
+        float found = found_bandwidth(s.material, s.lobes, wi, wo);
         bool these = lobed(s);
         r = Reflected(these ? luminance(value.rgb) : r.luminance, these ? found : r.lobe, value.a);
     }
@@ -150,7 +141,7 @@ int predict(uint entry) {
     uint id = gbuffer_material(at);
     Factors adjusted = factors_unpack(texelFetch(factors, at, 0));
     Material m = material_load(id, f.view.z, tangent_turn(f, tangent_decode(normal.xyz, normal.w)), adjusted);
-    Surface s = Surface(int(id), m, lobes_load(at, f, m), f.view);
+    Surface s = Surface(f, m, lobes_load(at, f, m));
 
     vec2 curvatures = principal_curvatures(c);
     float distance = c.depth * ray_length;
@@ -161,26 +152,15 @@ int predict(uint entry) {
     Sums sums = Sums(0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
     uvec2 seeds = sobol_seeds(hash(uint(block.y) << 16 | uint(block.x)) ^ frame.sampling.x);
     for (int i = 0; i < push.probes; ++i) {
-        uvec2 point = sobol_point(uint(i), seeds);
-        vec3 wi = vec3(0.0), h = vec3(0.0, 0.0, 1.0);
-        float per_density = 0.0;
-        if (UNFILTERED != 0u) {
-            vec4 drawn = material_sample(m, point);
-            float cos_d = dot(f.view, drawn.xyz);
-            h = drawn.xyz;
-            wi = cos_d > 0.0 ? h * (2.0 * cos_d) - f.view : wi;
-            per_density = 4.0 * cos_d / drawn.w;
-        }
-        wi = lobed(s) ? lobes_sample(m, s.lobes, f.view, point) : wi;
-        bool above = wi.z > 0.0;
-        wi = above ? wi : vec3(0.0, 0.0, 1.0);
-        h = above && !lobed(s) ? h : normalize(f.view + wi);
+        Drawn d = surface_sample(s, sobol_point(uint(i), seeds));
+        bool above = d.wi.z > 0.0;
+        vec3 wi = above ? d.wi : vec3(0.0, 0.0, 1.0), h = above ? d.h : normalize(f.view + wi);
         vec2 uv = latlong_uv(to_world(f, wi));
         uv.x -= frame.environment.x;
         float radiance = luminance(environment_fetch(uv).rgb);
-        Reflected r = reflected(s, wi, h);
-        // Of a direction that none is drawn in the density may be 0.
-        per_density = above ? (lobed(s) ? 1.0 / max(r.density, 1e-30) : per_density) : 0.0;
+        Reflected r = reflected(s, id, wi, h);
+        // In directions that are not drawn the density may be 0.
+        float per_density = above ? 1.0 / max(d.density > 0.0 ? d.density : r.density, 1e-30) : 0.0;
         float light = textureLod(environment_bandwidth, uv, 0.0).x;
         float b = image_bandwidth(OPERATOR, light, r.lobe, curvatures, distance, f.view.z, angle);
         add(sums, b, above ? radiance : 0.0, above ? r.luminance : 0.0, per_density);
@@ -203,7 +183,7 @@ int predict(uint entry) {
         float radiance = luminance(shadowed(lights[i], at)) * solid;
         bool distant = exact && lights[i].place.w == LIGHT_DIRECTIONAL;
         float nearness = distant ? 0.0 : 1.0 / max(length(lights[i].place.xyz - point), 1e-6);
-        Reflected r = reflected(s, wi, h);
+        Reflected r = reflected(s, id, wi, h);
         float b = image_bandwidth(OPERATOR, SHARPEST, r.lobe, curvatures + 0.5 * wi.z * nearness, distance, f.view.z, angle);
         add(sums, b, above ? radiance : 0.0, above ? r.luminance : 0.0, float(push.probes));
     }

@@ -41,6 +41,7 @@ layout(constant_id = 4) const int SHARING = 0;
 layout(constant_id = 5) const bool ALLOCATED = false;
 // Where the filter finds lobes: whether there are materials beside, which stay as they are.
 layout(constant_id = 10) const uint UNFILTERED = 1u;
+#include "surface.glsl"
 #include "approximation.glsl"
 #define SUNS_BINDING 13
 #include "suns.glsl"
@@ -115,17 +116,6 @@ void split(uint n) {
     environment_samples = push.environment_samples > 0u ? uint(max(int(other) - int(light_samples * area), 1)) : 0u;
 }
 
-// What the surface does with light.
-struct Surface {
-    Local frame;
-    Material material;
-    Lobes lobes;
-};
-
-bool lobed(Surface s) {
-    return LOBED != 0u && (s.lobes.count > 0u || UNFILTERED == 0u);
-}
-
 // What light from a direction adds: the environment's by the reflectance, and by the lobes that are looked up in its place; area lights'.
 struct Contribution {
     vec3 whole, looked_up, lights;
@@ -161,28 +151,16 @@ vec4 reflected(Surface s, vec3 wi, vec3 h) {
 // Contribution of a direction drawn from the reflectance, seen from world point p. The environment and every area light
 // weigh it against their own samples (balance heuristic, one light at a time: lights add up).
 Contribution brdf_contribution(Surface s, vec3 p, uvec2 u) {
-    vec3 wi = vec3(0.0), h = vec3(0.0, 0.0, 1.0); // 0 if none is drawn
-    float drawn = 0.0; // density per steradian of wi; 0 if it is that of the weights
-    if (UNFILTERED != 0u) {
-        vec4 half_vector = material_sample(s.material, u);
-        float cos_d = dot(s.frame.view, half_vector.xyz);
-        h = half_vector.xyz;
-        wi = cos_d > 0.0 ? h * (2.0 * cos_d) - s.frame.view : wi;
-        drawn = half_vector.w * 0.25 / max(cos_d, 1e-30);
-    }
-    if (lobed(s)) {
-        wi = lobes_sample(s.material, s.lobes, s.frame.view, u);
-        h = normalize(wi + s.frame.view);
-        drawn = 0.0;
-    }
+    Drawn d = surface_sample(s, u);
+    vec3 wi = d.wi;
     if (ESTIMATOR == ESTIMATOR_RESIDUAL ? dot(wi, wi) == 0.0 : wi.z <= 0.0) {
         return NOTHING;
     }
     vec3 w = to_world(s.frame, wi);
     vec4 light = environment_lookup(w);
-    vec4 value = reflected(s, wi, h);
+    vec4 value = reflected(s, wi, d.h);
     bool alone = ALONE != 0u;
-    drawn = drawn > 0.0 ? drawn : value.a;
+    float drawn = d.density > 0.0 ? d.density : value.a;
     float weight_density = alone ? drawn : value.a;
     float brdf = float(brdf_samples) * weight_density;
     float environment = alone ? 0.0 : float(environment_samples) * environment_per_steradian(light.a, length(w.xz));

@@ -19,6 +19,7 @@ mod passes;
 mod plan;
 pub mod reflectance;
 mod renderer;
+mod rounds;
 pub mod sampling;
 mod set_up;
 mod targets;

@@ -25,6 +25,7 @@ use crate::pass::{
 };
 use crate::passes::Passes;
 use crate::plan::{Directions, LIGHT_BYTES};
+use crate::rounds;
 use crate::targets::Targets;
 use ash::vk;
 use glam::Mat3;
@@ -149,7 +150,7 @@ impl Renderer {
         let (records, counts) = light::records(inputs.lights);
         let [exact, area] = counts;
         let lit = inputs.environment.intensity > 0.0;
-        shade::check_rounds(self.cx.most_rounds, &self.config, of_kinds.kinds, lit, counts)?;
+        rounds::check(self.cx.most_rounds, &self.config, of_kinds.kinds, lit, counts)?;
         if let Some(timings) = self.timer.begin_frame(&self.cx, cmd, inputs.slot)? {
             self.timings = Some(timings);
         }

@@ -3,6 +3,7 @@
 use crate::offline::error::{Error, Result};
 use crate::offline::session::Session;
 use crate::offline::{decision, footprint, levels};
+use crate::pass::shading_rate;
 use crate::{Config, Estimator, ShadingRate};
 
 /// A layer that `--aov` names.
@@ -177,7 +178,8 @@ impl Aov {
                 let bytes: Vec<u8> = session.words("rates").map_err(none)?.into_iter().flat_map(u32::to_le_bytes).collect();
                 let [width, height] = covered.output;
                 let [w, h] = SHADING_RATE.texel.map(|e| e as usize);
-                let row = width.div_ceil(w).next_multiple_of(4);
+                // Rows of whole words.
+                let row = 4 * shading_rate::words(shading_rate::texels(SHADING_RATE, config.extent)[0]) as usize;
                 let rate = |i: usize| bytes.get(i / width / h * row + i % width / w).map_or(0.0, |r| f32::from(r & 3));
                 scalar((0..width * height).map(rate).collect())
             }

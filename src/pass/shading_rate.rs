@@ -43,7 +43,7 @@ pub(crate) fn texels(rate: ShadingRate, extent: [u32; 2]) -> [u32; 2] {
 }
 
 /// Words of a row of `texels` texels.
-fn words(texels: u32) -> u32 {
+pub(crate) fn words(texels: u32) -> u32 {
     texels.div_ceil(4)
 }
 

@@ -126,8 +126,7 @@ pub struct Narrow {
 
 /// The narrowest lobe of a model that says how concentrated its normals are, seen at `cosine`: a lobe of concentration k about
 /// mu reflects into one of k / (4 |mu.wo|) (Wang et al. 2009, "All-frequency rendering of dynamic, spatially-varying
-/// reflectance", section 3). GGX counts as the Gaussian of
-/// its centre, k = 2 / alpha^2. `None` for tables and where nothing shines.
+/// reflectance", section 3). GGX counts as the Gaussian of its centre, k = 2 / alpha^2. `None` for tables and where nothing shines.
 pub fn analytic(model: &Model, cosine: f64) -> Option<Narrow> {
     let lobes: Vec<(DVec3, f64)> = match model {
         Model::Table(_) | Model::Turned(_) => Vec::new(),
