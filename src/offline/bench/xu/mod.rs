@@ -206,7 +206,7 @@ impl Stage<'_> {
         Ok(open(&self.world, &config, self.device())?.ok())
     }
 
-    /// `made` is what making maps took under the scene's other light, if that was measured.
+    /// `made` is what maps took under the scene's other light, if that was measured.
     fn measure(
         &self,
         made: &mut BTreeMap<&'static str, SetUp>,
@@ -228,8 +228,25 @@ impl Stage<'_> {
         })?;
         report.seconds.references += clock.elapsed().as_secs_f64();
 
-        let (mut stills, mut kept) = stills::take(self, &truth, &mut rows, &mut |done, total| told("images", done, total))?;
+        let moving = match self.order.preset {
+            Preset::Quick => None,
+            Preset::Full => Some(motion::Moving::new(self, &mut report.seconds.references, &mut told)?),
+        };
+        let (mut stills, mut costs, mut rest) = (Vec::new(), None, self.order.filters.as_slice());
+        while !rest.is_empty() {
+            let (group, more) = stills::take(self, &truth, rest, &mut rows, &mut |done, total| told("images", done, total))?;
+            let mut kept = group.kept;
+            stills.extend(group.stills);
+            if let Some(moving) = &moving {
+                moving.flicker(self, &mut rows, &mut kept, &mut told)?;
+            }
+            let frames = &mut |done, total| told("frames", done, total);
+            let found = times::measure(self, &mut rows, kept, report.copy_gb_per_s, made, frames)?;
+            costs.get_or_insert(found);
+            rest = more;
+        }
         let clock = Instant::now();
+        stills::judge(&mut stills, &truth, &mut rows)?;
         let smallest = rows.iter().filter_map(|r| r.errors.as_ref()).map(|e| e.rmse).fold(f64::INFINITY, f64::min);
         let goal = Goal { noise: smallest / MARGIN, most: self.order.preset.most_samples().into() };
         if truth.noise()?.rmse > goal.noise && truth.directions() < goal.most {
@@ -239,13 +256,7 @@ impl Stage<'_> {
         report.seconds.references += clock.elapsed().as_secs_f64();
         let noise = truth.noise()?;
         let smallest = rows.iter().filter_map(|r| r.errors.as_ref()).map(|e| e.rmse).fold(f64::INFINITY, f64::min);
-
-        let flicker_noise = match self.order.preset {
-            Preset::Quick => None,
-            Preset::Full => Some(motion::flicker(self, &mut rows, &mut kept, report, &mut told)?),
-        };
-        let frames = &mut |done, total| told("frames", done, total);
-        let cost = times::measure(self, &mut rows, kept, report.copy_gb_per_s, made, frames)?;
+        let cost = costs.ok_or_else(|| Error::argument("filters", "at least one", "none"))?;
         if let Some(keep) = keep.as_mut() {
             keep(&self.world.name, strips::strip(self, &truth, &stills, &rows))?;
         }
@@ -261,7 +272,7 @@ impl Stage<'_> {
                 pixels: stills::mask(&truth).iter().filter(|m| **m).count(),
                 margin: smallest / noise.rmse,
             },
-            flicker_noise,
+            flicker_noise: moving.map(|moving| moving.noise),
             texels: cost.texels,
             estimator: cost.estimator,
             supersampling: cost.supersampling,

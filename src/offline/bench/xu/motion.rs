@@ -2,7 +2,7 @@
 
 use crate::offline::bench::quality::Frame;
 use crate::offline::bench::reference::Goal;
-use crate::offline::bench::xu::report::{Flicker, Report, Row};
+use crate::offline::bench::xu::report::{Flicker, Row};
 use crate::offline::bench::xu::stills::Kept;
 use crate::offline::bench::xu::truths::Truths;
 use crate::offline::bench::xu::{Stage, finite, stills};
@@ -45,65 +45,89 @@ impl Motion {
     }
 }
 
-/// Flicker of every filter that took the still, in the session that is `kept` of it, into its row; and that of truths, from their halves.
-pub(super) fn flicker(
-    stage: &Stage<'_>,
-    rows: &mut [Row],
-    kept: &mut [Kept],
-    report: &mut Report,
-    told: &mut dyn FnMut(&str, u64, u64),
-) -> Result<Flicker> {
-    let mut found: Vec<[f64; 2]> = vec![[0.0; 2]; kept.len()];
-    let mut noise = [0.0; 2];
-    let frames_of = kept.len() as u64;
-    let total = u64::from(FRAMES);
-    let extent = stage.config.extent.map(|e| e.min(MOST_SIDE));
-    for (which, motion) in [Motion::Zoom, Motion::Orbit].into_iter().enumerate() {
-        let cameras: Vec<Camera> = (0..FRAMES).map(|frame| motion.camera(&stage.world.camera, frame)).collect();
+/// What the eye sees along one motion.
+struct Path {
+    cameras: Vec<Camera>,
+    truths: Vec<Picture>,
+    masks: Vec<Vec<bool>>,
+}
+
+impl Path {
+    fn flicker(&self, a: &[Picture], b: &[Picture]) -> Result<f64> {
+        let pairs: Vec<Pair<'_>> = a.iter().zip(b).zip(&self.masks).map(|((a, b), mask)| Pair { a, b, mask }).collect();
+        finite(measure(&pairs)?, "flicker")
+    }
+}
+
+/// Truths of both motions.
+pub(super) struct Moving {
+    paths: [Path; 2],
+    extent: [u32; 2],
+    /// Of the truths themselves, from their halves.
+    pub noise: Flicker,
+}
+
+impl Moving {
+    /// `references` is how long truths took.
+    pub fn new(stage: &Stage<'_>, references: &mut f64, told: &mut dyn FnMut(&str, u64, u64)) -> Result<Self> {
         let clock = Instant::now();
-        let mut truths = Truths::new(&stage.world, stage.device(), stage.order.cache.as_deref(), SAMPLES / 2);
-        let goal = Goal { noise: 0.0, most: SAMPLES.into() };
-        let (mut pictures, mut masks, mut halves): (Vec<Picture>, Vec<_>, [Vec<Picture>; 2]) = Default::default();
-        for (done, camera) in (0..).zip(&cameras) {
-            let truth = truths.of(camera, extent, &goal, &mut |_, _| ())?;
-            pictures.push(truth.image().picture);
-            masks.push(stills::mask(&truth));
-            halves.iter_mut().zip(truth.halves()).for_each(|(all, half)| all.push(half));
-            told("moving truths", done + 1, total);
-        }
-        report.seconds.references += clock.elapsed().as_secs_f64();
-        let of = |a: &[Picture], b: &[Picture]| -> Result<f64> {
-            let pairs: Vec<Pair<'_>> = a.iter().zip(b).zip(&masks).map(|((a, b), mask)| Pair { a, b, mask }).collect();
-            finite(measure(&pairs)?, "flicker")
+        let extent = stage.config.extent.map(|e| e.min(MOST_SIDE));
+        let mut path = |motion: Motion| -> Result<(Path, f64)> {
+            let cameras: Vec<Camera> = (0..FRAMES).map(|frame| motion.camera(&stage.world.camera, frame)).collect();
+            let mut truths = Truths::new(&stage.world, stage.device(), stage.order.cache.as_deref(), SAMPLES / 2);
+            let goal = Goal { noise: 0.0, most: SAMPLES.into() };
+            let mut path = Path { cameras: Vec::new(), truths: Vec::new(), masks: Vec::new() };
+            let mut halves: [Vec<Picture>; 2] = Default::default();
+            for (done, camera) in (1..).zip(&cameras) {
+                let truth = truths.of(camera, extent, &goal, &mut |_, _| ())?;
+                path.truths.push(truth.image().picture);
+                path.masks.push(stills::mask(&truth));
+                halves.iter_mut().zip(truth.halves()).for_each(|(all, half)| all.push(half));
+                told("moving truths", done, u64::from(FRAMES));
+            }
+            // The difference of halves has twice the spread of their mean.
+            let noise = path.flicker(&halves[0], &halves[1])? / 2.0;
+            Ok((Path { cameras, ..path }, noise))
         };
-        // The difference of halves has twice the spread of their mean.
-        noise[which] = of(&halves[0], &halves[1])? / 2.0;
-        for (done, (Kept { filter, session, .. }, found)) in (1..).zip(kept.iter_mut().zip(&mut found)) {
-            // What is drawn anew in each frame flickers by that.
-            if !filter.is_random() {
-                let mut world = stage.world.clone();
+        let ((zoom, zooming), (orbit, orbiting)) = (path(Motion::Zoom)?, path(Motion::Orbit)?);
+        *references += clock.elapsed().as_secs_f64();
+        Ok(Self { paths: [zoom, orbit], extent, noise: Flicker { zoom: zooming, orbit: orbiting } })
+    }
+
+    /// Flicker of every filter whose session is `kept`, into its row.
+    pub fn flicker(
+        &self,
+        stage: &Stage<'_>,
+        rows: &mut [Row],
+        kept: &mut [Kept],
+        told: &mut dyn FnMut(&str, u64, u64),
+    ) -> Result<()> {
+        // What is drawn anew in each frame flickers by that.
+        let of: Vec<&mut Kept> = kept.iter_mut().filter(|kept| !kept.filter.is_random()).collect();
+        let total = of.len() as u64;
+        for (done, Kept { filter, session, .. }) in (1..).zip(of) {
+            session.resize(self.extent)?;
+            let mut world = stage.world.clone();
+            let mut found = |path: &Path| -> Result<f64> {
                 let mut frames = Vec::new();
-                session.resize(extent)?;
-                for (number, camera) in (0..).zip(&cameras) {
+                for (number, camera) in (0..).zip(&path.cameras) {
                     world.camera = *camera;
                     session.show(&world)?;
                     session.frame([SEED, number])?;
                     frames.push(Frame::read(session)?.picture);
                 }
-                session.resize(stage.config.extent)?;
-                session.show(&stage.world)?;
-                found[which] = of(&frames, &pictures)?;
+                path.flicker(&frames, &path.truths)
+            };
+            let [zoom, orbit] = [found(&self.paths[0])?, found(&self.paths[1])?];
+            if let Some(row) = rows.iter_mut().find(|row| row.filter == filter.name()) {
+                row.flicker = Some(Flicker { zoom, orbit });
             }
-            told("moving frames", done, frames_of);
+            session.resize(stage.config.extent)?;
+            session.show(&stage.world)?;
+            told("moving frames", done, total);
         }
+        Ok(())
     }
-    for (kept, [zoom, orbit]) in kept.iter().zip(found).filter(|(kept, _)| !kept.filter.is_random()) {
-        if let Some(row) = rows.iter_mut().find(|row| row.filter == kept.filter.name()) {
-            row.flicker = Some(Flicker { zoom, orbit });
-        }
-    }
-    let [zoom, orbit] = noise;
-    Ok(Flicker { zoom, orbit })
 }
 
 #[cfg(test)]

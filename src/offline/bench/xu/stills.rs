@@ -17,6 +17,8 @@ const DIRECTIONS: u32 = 256;
 const MARGIN: f64 = 10.0;
 /// Frames after which it is as it is; of a filter that draws lobes, which need more.
 const MOST_FRAMES: [u32; 2] = [8, 16];
+/// Of the maps of filters that are measured together, before the last of them.
+const MOST_BYTES: u64 = 4 << 30;
 /// A pixel is judged if it is covered by this much: of truths, whose sums are rounded.
 const WHOLE: f32 = 0.9999;
 /// Of frames, whose numbers tell them from those that are timed.
@@ -45,17 +47,33 @@ pub(super) fn mask(truth: &Converged) -> Vec<bool> {
     truth.image().coverage.iter().map(|a| *a >= WHOLE).collect()
 }
 
-/// Renders and judges all filters; those that refuse have it in their row. The sessions of the others.
-pub(super) fn take(
+/// Filters that are measured together, as their maps are in memory together.
+pub(super) struct Group {
+    pub stills: Vec<Still>,
+    /// Of those that did not refuse.
+    pub kept: Vec<Kept>,
+}
+
+/// Renders the first of `filters`, until their maps fill [`MOST_BYTES`]; those that refuse have it in their row. The filters that are
+/// left.
+pub(super) fn take<'f>(
     stage: &Stage<'_>,
     truth: &Converged,
+    filters: &'f [Filter],
     rows: &mut [Row],
     progress: &mut dyn FnMut(u64, u64),
-) -> Result<(Vec<Still>, Vec<Kept>)> {
-    let total = rows.len() as u64;
+) -> Result<(Group, &'f [Filter])> {
+    let total = rows.len();
     let reference = (truth.image().picture, mask(truth));
-    let (mut stills, mut kept) = (Vec::new(), Vec::new());
-    for (done, (filter, row)) in (1..).zip(stage.order.filters.iter().copied().zip(rows.iter_mut())) {
+    let (mut stills, mut kept): (Vec<Still>, Vec<Kept>) = (Vec::new(), Vec::new());
+    let mut rest = filters;
+    while let Some((filter, more)) = rest.split_first() {
+        if kept.iter().map(|k| k.session.material_bytes()).sum::<u64>() > MOST_BYTES {
+            break;
+        }
+        rest = more;
+        let Some(row) = rows.iter_mut().find(|row| row.filter == filter.name()) else { continue };
+        let filter = *filter;
         let config = stage.config(filter, stage.config.extent, DIRECTIONS);
         // Of points the same is summed exactly by all.
         let mut looked_up = stage.looked_up(filter, stage.config.extent)?;
@@ -77,10 +95,9 @@ pub(super) fn take(
             }
             Err(reason) => row.refused = Some(reason),
         }
-        progress(done, total);
+        progress((total - rest.len()) as u64, total as u64);
     }
-    judge(&mut stills, truth, rows)?;
-    Ok((stills, kept))
+    Ok((Group { stills, kept }, rest))
 }
 
 /// The mean of enough frames, how many they are, and their noise as a part of the mean.

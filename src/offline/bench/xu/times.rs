@@ -40,6 +40,8 @@ pub(super) struct SetUp {
     ms: Vec<f64>,
     /// Of the pass that makes mips.
     mips_ms: Vec<f64>,
+    /// What the maps take.
+    bytes: u64,
 }
 
 /// A session whose maps are made anew before every timed frame, until that is known.
@@ -67,8 +69,8 @@ impl Timed for Subject {
     }
 }
 
-/// Times of every filter that took the still, in the session that is `kept` of it where light is looked up, into its row. `copy` is how fast
-/// the device copies, and `known` what making maps took under another light, or will hold it.
+/// Times of every filter whose session is `kept`, in that session where light is looked up, into its row. `copy` is how fast the
+/// device copies, and `known` what maps took before, under another light or of other filters, or will hold it.
 pub(super) fn measure(
     stage: &Stage<'_>,
     rows: &mut [Row],
@@ -99,11 +101,20 @@ pub(super) fn measure(
         let set_up = known.get(filter.name()).cloned();
         let rounds = if set_up.is_some() { 0 } else { stage.rounds };
         match session {
-            Ok(session) => subjects.push(Subject { session, filter: Some(filter), rounds, set_up: set_up.unwrap_or_default() }),
+            Ok(session) => {
+                let set_up = set_up.unwrap_or_else(|| SetUp { bytes: session.material_bytes(), ..SetUp::default() });
+                subjects.push(Subject { session, filter: Some(filter), rounds, set_up });
+            }
             Err(reason) => {
                 rows.iter_mut().filter(|row| row.filter == filter.name()).for_each(|row| row.refused = Some(reason.clone()))
             }
         }
+    }
+    // Filters are compared with one that is timed in the same frames.
+    if rows.iter().any(|row| row.filter == LEAN && row.cost.is_some()) {
+        let lean = opened(Some(Filter::Lean), extent, estimator.0)?;
+        let set_up = known.get(LEAN).cloned().unwrap_or_default();
+        subjects.extend(lean.ok().map(|session| Subject { session, filter: Some(Filter::Lean), rounds: 0, set_up }));
     }
     let times = interleave(&mut subjects, stage.rounds, progress)?;
     known.extend(subjects.iter().filter_map(|s| Some((s.filter?.name(), s.set_up.clone()))));
@@ -118,11 +129,11 @@ pub(super) fn measure(
         known.and_then(|i| times.get(i)).map(|times| shading(times))
     };
     let (lean, texels) = (named(LEAN), texels(&stage.world));
-    let plain = subjects.iter().find(|s| s.filter == Some(Filter::Point)).map_or(0, |s| s.session.material_bytes());
+    let plain = known.get(Filter::Point.name()).map_or(0, |made| made.bytes);
     let supersampled = times.first().map(|times| shading(times)).unwrap_or_default();
     let cost = |subject: &Subject, times: &[FrameTimings]| {
         let shade = shading(times);
-        let SetUp { ms: set_up, mips_ms } = &subject.set_up;
+        let SetUp { ms: set_up, mips_ms, bytes: held } = &subject.set_up;
         let both: Vec<f64> = shade.iter().zip(set_up).map(|(a, b)| a + b).collect();
         let has_maps = set_up.iter().any(|ms| *ms > 0.0);
         let set_up_ms = has_maps.then(|| Summary::of(set_up));
@@ -143,7 +154,7 @@ pub(super) fn measure(
             gain_with_set_up: ratio_of_medians(&supersampled, if has_maps { &both } else { &shade }).filter(|_| is_filter),
             over_lean: lean.as_ref().and_then(|lean| ratio_of_medians(&shade, lean)).filter(|_| is_filter),
             ns_a_texel: set_up_ms.and_then(|ms| each(ms.median * 1e6)),
-            bytes_a_texel: each(subject.session.material_bytes().saturating_sub(plain) as f64),
+            bytes_a_texel: each(held.saturating_sub(plain) as f64),
         }
     };
     let mut supersampling = None;
@@ -153,7 +164,7 @@ pub(super) fn measure(
             None => supersampling = Some(found),
             Some(filter) => {
                 if let Some(row) = rows.iter_mut().find(|row| row.filter == filter.name()) {
-                    row.cost = Some(found);
+                    row.cost.get_or_insert(found);
                 }
             }
         }
