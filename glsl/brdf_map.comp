@@ -13,8 +13,9 @@ layout(constant_id = 0) const uint FILTER = 0u;
 layout(constant_id = 1) const uint RULE = 0u;
 layout(set = 2, binding = 0) uniform sampler2DArray normals;   // x and y
 layout(set = 2, binding = 1) uniform sampler2DArray roughness; // a value
-layout(set = 2, binding = 2, rgba32f) uniform writeonly image2DArray moments;
-layout(set = 2, binding = 3, std430) readonly buffer Spreads {
+layout(set = 2, binding = 2) uniform sampler2DArray colours;   // specular
+layout(set = 2, binding = 3, rgba32f) uniform writeonly image2DArray moments;
+layout(set = 2, binding = 4, std430) readonly buffer Spreads {
     float spreads[]; // src/distribution/literal.rs, SpreadTable
 };
 layout(push_constant) uniform Push {
@@ -25,6 +26,7 @@ layout(push_constant) uniform Push {
     int layer;            // first of moments
     int normal_layer;     // below 0 for none
     int roughness_layer;  // below 0 for none
+    int colour_layer;     // below 0 for none
     float rule;           // of the roughness map, and the greatest alpha that it gives
     float most;
     uint upright;         // whether all lobes are about the normal
@@ -55,6 +57,19 @@ float mean_spread(ivec2 p, ivec2 size) {
             float alpha = alpha_by_rule(rule, texelFetch(roughness, ivec3(x, y, roughness_layer), 0).x, most);
             float of_lobe = lobes == LOBES_EXPONENT ? 0.5 * alpha * alpha : vmf_spread(2.0 / (alpha * alpha));
             sum += of_lobe * cover_share(columns, x, from.x, size.x) * cover_share(rows, y, from.y, size.y);
+        }
+    }
+    return sum;
+}
+
+vec3 mean_colour(ivec2 p, ivec2 size) {
+    ivec2 from = textureSize(colours, 0).xy;
+    Cover columns = cover(p.x, from.x, size.x), rows = cover(p.y, from.y, size.y);
+    vec3 sum = vec3(0.0);
+    for (int y = rows.first; y <= rows.last; ++y) {
+        for (int x = columns.first; x <= columns.last; ++x) {
+            float share = cover_share(columns, x, from.x, size.x) * cover_share(rows, y, from.y, size.y);
+            sum += texelFetch(colours, ivec3(x, y, colour_layer), 0).rgb * share;
         }
     }
     return sum;
@@ -140,5 +155,8 @@ void main() {
             first = vec4(0.0);
             second = vec4(0.0);
         }
+    }
+    if (colour_layer >= 0) {
+        imageStore(moments, ivec3(p, next), vec4(mean_colour(p, size), 0.0));
     }
 }

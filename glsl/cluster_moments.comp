@@ -17,6 +17,7 @@ layout(push_constant) uniform Push {
     uint first;     // cluster of the material's
     uint all;       // of these
     uint upright;   // whether lobes are about the normal, which is in the layer before theirs else
+    uint coloured;  // whether their specular colour is in the layer behind theirs
 };
 
 void main() {
@@ -30,11 +31,16 @@ void main() {
         firsts[i] = vec4(0.0);
         seconds[i] = vec4(0.0);
     }
+    vec3 thirds[MOST_COLOURED];
+    for (uint i = 0u; i < MOST_COLOURED; ++i) {
+        thirds[i] = vec3(0.0);
+    }
     Cover columns = cover(p.x, from.x, size.x), rows = cover(p.y, from.y, size.y);
     for (int y = rows.first; y <= rows.last; ++y) {
         for (int x = columns.first; x <= columns.last; ++x) {
             float share = cover_share(columns, x, from.x, size.x) * cover_share(rows, y, from.y, size.y);
             vec2 normal = upright != 0u ? vec2(0.0) : stereographic_of(imageLoad(lobes, ivec3(x, y, lobe_layer - 1)).xyz);
+            vec3 colour = coloured == 0u ? vec3(0.0) : imageLoad(lobes, ivec3(x, y, lobe_layer + int(count))).rgb;
             for (uint i = 0u; i < count; ++i) {
                 vec4 lobe = imageLoad(lobes, ivec3(x, y, lobe_layer + int(i)));
                 Placed placed = cluster_place(first, all, lobe.xyz, lobe.w, share * weights[i], kind);
@@ -43,6 +49,9 @@ void main() {
                     bool mine = k == placed.cluster;
                     firsts[k] += mine ? placed.first : vec4(0.0);
                     seconds[k] += mine ? vec4(placed.second, normal * placed.first.x) : vec4(0.0);
+                }
+                for (uint k = 0u; k < MOST_COLOURED; ++k) {
+                    thirds[k] += k == placed.cluster ? colour * placed.first.x : vec3(0.0);
                 }
             }
         }
@@ -53,6 +62,11 @@ void main() {
         }
         if (i < all && upright == 0u) {
             imageStore(cells, ivec3(p, cell_layer + int(all + i)), seconds[i]);
+        }
+    }
+    for (uint i = 0u; i < MOST_COLOURED; ++i) {
+        if (i < all && coloured != 0u) {
+            imageStore(cells, ivec3(p, cell_layer + int(clusters_colour(i, all, upright))), vec4(thirds[i], 0.0));
         }
     }
     for (uint i = 0u; i < MOST_CLUSTERS; i += 2u) {

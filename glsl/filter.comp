@@ -40,6 +40,8 @@ layout(constant_id = 13) const float LENGTH_OF_QUARTERS = 0.0;
 layout(constant_id = 14) const bool CAMERA = false;
 // The most clusters that a material has.
 layout(constant_id = 15) const uint CLUSTERS = 1u;
+// Whether those of some keep colours.
+layout(constant_id = 16) const bool COLOURED = false;
 
 struct MapRecord {
     uvec4 places;        // albedo, specular, normal, roughness: 0 for none, else (layer << 3 | class) + 1
@@ -54,7 +56,7 @@ struct MapRecord {
     uint upright;        // whether all are about the normal
     float concentration; // of the one lobe of a material without maps of normals and roughness
     float facing;        // mean cosine of the lobes' directions to the normal
-    uvec4 clusters;      // the first, and how many there are; of Gaussians what gaussians.glsl says
+    uvec4 clusters;      // the first, how many there are, and whether they keep colours; of Gaussians what gaussians.glsl says
 };
 layout(set = 2, binding = 1, std430) readonly buffer Maps {
     MapRecord maps[]; // by material
@@ -75,6 +77,7 @@ struct Found {
     vec3 mean;       // of their directions, stored as x, y, 1 - z
     uint lobes;      // LOBES_* of moments.glsl
     float area;      // mean cosine of the lobes below, about the normals that they have there
+    vec3 specular;   // of the place
 };
 const float MATTERS = 0.02;
 
@@ -320,7 +323,7 @@ void main() {
         n = record.places.z != 0u && t.w != 0.0 ? bent : n;
     }
     if (LOBES != 0u) {
-        Found found = Found(tangent_frame(n, t), f.kernel, 0u, 0.0, vec3(0.0), record.lobes, 1.0);
+        Found found = Found(tangent_frame(n, t), f.kernel, 0u, 0.0, vec3(0.0), record.lobes, 1.0, f.specular);
         if (record.moments != 0u) {
             decode(p, record, uv, footprint, found);
         } else if (filter_of_slopes(FILTER)) {

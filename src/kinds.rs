@@ -30,6 +30,8 @@ pub(crate) struct Kinds {
     pub uses: Uses,
     /// The most clusters that one has, at least 1.
     pub most_clusters: u32,
+    /// Some of which lobes have colours of their own.
+    pub coloured: bool,
 }
 
 impl Kinds {
@@ -51,6 +53,7 @@ impl Kinds {
             coordinates: materials.iter().any(Material::takes_coordinates),
             uses: maps.uses,
             most_clusters: maps.most_clusters,
+            coloured: maps.coloured,
         }
     }
 }
@@ -73,7 +76,7 @@ impl OfKinds {
         let (looked_up, drawn) = (config.estimator.looks_up(), config.estimator != Estimator::Preconvolved);
         Ok(Self {
             kinds,
-            filter: filter::Filter::new(p, config, kinds.uses, kinds.most_clusters)?,
+            filter: filter::Filter::new(p, config, kinds.uses, (kinds.most_clusters, kinds.coloured))?,
             bandwidth: config.predicts().then(|| bandwidth::Bandwidth::new(p, config, kinds)).transpose()?,
             base: looked_up.then(|| base::Base::new(p, config, kinds)).transpose()?,
             shade: drawn.then(|| shade::Shade::new(p, config, config.coarsest() > 0, kinds)).transpose()?,

@@ -2,6 +2,7 @@
 //! `vmf_mips` and of what `filter` decodes.
 
 use crate::distribution::brdf_map::UPRIGHT;
+use crate::distribution::cluster_search::Colours;
 use crate::distribution::effective::{self, Rule, ggx_mean_cosine};
 use crate::distribution::filtered::{Area, Known};
 use crate::distribution::surface::FoundLobes;
@@ -134,10 +135,13 @@ pub(crate) fn clusters(material: &Material, base: &Base, filter: Filter) -> Opti
         return None;
     }
     let size = base.size(material);
-    let texel = |i: usize| {
+    let centre = |i: usize| {
         let [w, h] = size.map(f64::from);
         let (x, y) = ((i % size[0] as usize) as f64, (i / size[0] as usize) as f64);
-        let uv = DVec2::new((x + 0.5) / w, 1.0 - (y + 0.5) / h);
+        DVec2::new((x + 0.5) / w, 1.0 - (y + 0.5) / h)
+    };
+    let texel = |i: usize| {
+        let uv = centre(i);
         let normal = material.maps.normal.as_ref().map_or(DVec3::Z, |map| unit(map.sample(uv, 0.0).truncate().truncate()));
         let roughness = base.roughness(material).zip(material.maps.roughness.as_ref());
         let lobes = roughness.and_then(|(map, (_, kind))| {
@@ -146,7 +150,10 @@ pub(crate) fn clusters(material: &Material, base: &Base, filter: Filter) -> Opti
         });
         effective::lobes(lobes.as_deref().unwrap_or(plain), normal, Rule::Exact)
     };
-    Some(Clusters::of(size, !base.upright(), &texel))
+    let colour = |map: &Texture, i: usize| map.sample(centre(i), 0.0).truncate();
+    let specular = material.maps.specular.as_ref();
+    let colours = specular.map(|map| move |i| colour(map, i));
+    Some(Clusters::of(size, !base.upright(), &texel, colours.as_ref().map(|c| c as &Colours<'_>)))
 }
 
 /// The mixtures of a material of which `base` is filtered by `filter`, over maps of `size`, if the filter has some: those that are known
@@ -183,7 +190,12 @@ impl Moments {
             let gaussians = || gaussians(material, &base, size, filter).map_or(Known::Nothing, Known::Gaussians);
             let known = clusters(material, &base, filter).map_or_else(gaussians, Known::Clusters);
             let area = Parameter::of(&material.model).area();
-            Some(Filtered::keeping(filter, BrdfMap::of(material, size, rule).ok()?, rule, known, area)?.divided(division))
+            let map = BrdfMap::of(material, size, rule).ok()?;
+            let map = match (&known, &material.maps.specular) {
+                (Known::Clusters(clusters), Some(colours)) if clusters.layout().colours => map.coloured(colours),
+                _ => map,
+            };
+            Some(Filtered::keeping(filter, map, rule, known, area)?.divided(division))
         };
         let lobes = if base == Base::Normals { None } else { Some(keep(material, filter, rule)?) };
         let normals = if base.upright() {
@@ -227,6 +239,7 @@ impl Moments {
                 below,
                 mass: None,
                 own: Vec::new(),
+                colours: Vec::new(),
                 facing,
                 masking,
             };
@@ -235,7 +248,8 @@ impl Moments {
         let lobes = map.decode(&texel);
         if let Mixture::Slopes(_) = &lobes {
             let (normals, below) = (Vec::new(), Vec::new());
-            return FoundLobes { normal: DVec3::Z, lobes, normals, below, mass: None, own: Vec::new(), facing, masking };
+            let (own, colours) = (Vec::new(), Vec::new());
+            return FoundLobes { normal: DVec3::Z, lobes, normals, below, mass: None, own, colours, facing, masking };
         }
         let by_cell = map.normals(&texel);
         let normal = match (of_normals(), by_cell.is_empty() || map.mass(&texel).is_some()) {
@@ -244,8 +258,8 @@ impl Moments {
         };
         let normals = (0..lobes.count()).map(|i| by_cell.get(i).and_then(|n| n.try_normalize()).unwrap_or(normal)).collect();
         let below = map.concentrations_below(&texel, lobes.count());
-        let (mass, own) = (map.mass(&texel), map.own_concentrations(&texel));
-        FoundLobes { normal, lobes, normals, below, mass, own, facing, masking }
+        let (mass, own, colours) = (map.mass(&texel), map.own_concentrations(&texel), map.colours(&texel));
+        FoundLobes { normal, lobes, normals, below, mass, own, colours, facing, masking }
     }
 }
 

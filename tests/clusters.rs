@@ -10,15 +10,17 @@ mod support {
 }
 
 use chosen_device::DEVICE;
-use glam::DVec3;
+use glam::{DVec2, DVec3};
+use passband::distribution::clusters::{Layout, MOMENTS};
 use passband::moments::Moments;
 use passband::offline::builtin;
 use passband::offline::headless::{Headless, Options};
 use passband::offline::reference::Options as Quadrature;
 use passband::offline::session::Session;
 use passband::offline::world::World;
-use passband::{Config, Division, Estimator, Filter, Light, Maps, Requirements, Roughness, Rule};
-use support::filters::{Minified, blinn_phong, lobes, normals, plane, roughness, scene};
+use passband::{Config, Division, Estimator, Filter, Light, Maps, Requirements, Roughness, Rule, Texture};
+use std::sync::Arc;
+use support::filters::{Minified, blinn_phong, lobes, normals, plane, roughness, scene, sheen};
 use support::frames::{Stage, config, expected_with, furthest, ggx, ratio, tiles, world};
 
 fn session(world: &World, config: &Config) -> Session {
@@ -27,12 +29,11 @@ fn session(world: &World, config: &Config) -> Session {
     Session::new(headless, world, config).unwrap()
 }
 
-fn materials() -> World {
-    let mut scene = world("sphere", 16, blinn_phong(), builtin::environment("constant", 16).unwrap());
-    let first = scene.materials[0].clone();
+type Named = (&'static str, passband::reflectance::Model, Maps);
+
+fn plain() -> Vec<Named> {
     let odd = [67, 45];
-    let with = |normal, roughness| Maps { normal, roughness, ..Maps::default() };
-    let all = [
+    vec![
         ("ggx", ggx(0.3, DVec3::ONE, DVec3::ZERO), with(normals(odd, 0.5), None)),
         (
             "rough ggx",
@@ -42,7 +43,33 @@ fn materials() -> World {
         ("rough blinn-phong", blinn_phong(), with(normals(odd, 0.2), roughness(odd, Roughness::Alpha, 0.1, 0.4))),
         ("two lobes", lobes(&[(0.7, 30.0), (-0.5, 60.0)]), with(normals(odd, 0.4), roughness(odd, Roughness::Alpha, 0.1, 0.8))),
         ("no map", blinn_phong(), Maps::default()),
-    ];
+    ]
+}
+
+/// Whose colours go together with their roughness. Classes of maps are few, so that all are of few sizes.
+fn coloured() -> Vec<Named> {
+    let odd = [67, 45];
+    vec![
+        (
+            "coloured",
+            ggx(0.3, DVec3::ONE, DVec3::ZERO),
+            Maps { specular: sheen([32, 64]), ..with(normals(odd, 0.02), roughness(odd, Roughness::Alpha, 0.05, 0.6)) },
+        ),
+        (
+            "two coloured lobes",
+            lobes(&[(0.5, 30.0), (-0.5, 60.0)]),
+            Maps { specular: sheen([32, 64]), ..with(normals(odd, 0.02), roughness(odd, Roughness::Alpha, 0.05, 0.6)) },
+        ),
+    ]
+}
+
+fn with(normal: Option<Arc<Texture>>, roughness: Option<(Arc<Texture>, Roughness)>) -> Maps {
+    Maps { normal, roughness, ..Maps::default() }
+}
+
+fn materials(all: Vec<Named>) -> World {
+    let mut scene = world("sphere", 16, blinn_phong(), builtin::environment("constant", 16).unwrap());
+    let first = scene.materials[0].clone();
     scene.materials = all
         .into_iter()
         .map(|(name, model, maps)| {
@@ -56,9 +83,14 @@ fn materials() -> World {
 
 #[test]
 fn passes_store_the_moments_of_the_twin() {
-    let scene = materials();
+    for all in [plain(), coloured()] {
+        moments_are_those_of_the_twin(&materials(all));
+    }
+}
+
+fn moments_are_those_of_the_twin(scene: &World) {
     let config = Config { filter: Filter::Clusters, ..config([8, 8], Estimator::Mis, 2) };
-    let [mut one, mut other] = [session(&scene, &config), session(&scene, &config)];
+    let [mut one, mut other] = [session(scene, &config), session(scene, &config)];
     assert!(one.setup().iter().any(|(name, _)| *name == "cluster_moments"));
     for (number, material) in scene.materials.iter().enumerate() {
         let name = &material.name;
@@ -72,13 +104,16 @@ fn passes_store_the_moments_of_the_twin() {
         let twin = twin.lobes().unwrap();
         let clusters = twin.clusters_of_map().unwrap();
         let all = clusters.all().len();
-        let normals = name == "two lobes";
+        let (normals, coloured) = (name.starts_with("two"), name.contains("coloured"));
+        assert_eq!(clusters.layout(), Layout { normals, colours: coloured }, "{name}");
         // Of 8 bytes each.
         assert!(layers.len() * 8 == clusters.bytes() && clusters.bytes() <= 96, "{name}: {} layers", layers.len());
         assert_eq!(
             moments.len(),
             match name.as_str() {
+                "two coloured lobes" => 4,
                 "two lobes" => 3,
+                "coloured" => 2,
                 _ => 1,
             }
         );
@@ -92,11 +127,15 @@ fn passes_store_the_moments_of_the_twin() {
                     let [q, x, y, xx] = stored(k);
                     let two = stored(all + if normals { k } else { k / 2 });
                     let (xy, yy) = if normals { (two[0], two[1]) } else { (two[2 * (k % 2)], two[2 * (k % 2) + 1]) };
-                    let e: &[f64] = &expected[8 * k..8 * k + 8];
+                    let e: &[f64] = &expected[MOMENTS * k..][..MOMENTS];
                     // Lengths are stored 16 times as long; numbers of 16 bits have errors in proportion.
                     let scale = 1e-3 * e[0] + 1e-6;
                     if normals {
                         off = off.max((two[2] - e[6]).abs().max((two[3] - e[7]).abs()) / scale);
+                    }
+                    if coloured {
+                        let colour = stored(all + if normals { all } else { all.div_ceil(2) } + k);
+                        off = (0..3).map(|c| (colour[c] - e[8 + c]).abs() / scale).fold(off, f64::max);
                     }
                     let far = (e[3] + e[5]).max(1e-3 * e[0]) * 256.0;
                     off = off.max((q - e[0]).abs() / scale);
@@ -117,7 +156,7 @@ fn passes_store_the_moments_of_the_twin() {
 
 #[test]
 fn peaks_are_stored_as_they_are() {
-    let scene = materials();
+    let scene = materials(plain());
     let config = Config { filter: Filter::Fournier4, ..config([8, 8], Estimator::Mis, 2) };
     let mut session = session(&scene, &config);
     for (number, material) in scene.materials.iter().enumerate() {
@@ -157,6 +196,8 @@ fn frames_are_those_of_the_quadrature() {
         ("blinn-phong", Filter::Clusters, blinn_phong(), all(odd), [2048, 1]),
         ("one lobe", Filter::Clusters, lobes(&[(0.0, 60.0)]), all(odd), [2048, 1]),
         ("two lobes", Filter::Clusters, two(), tiled(normals([64; 2], 0.3), None), [2048, 1]),
+        ("coloured ggx", Filter::Clusters, metal(), Maps { specular: sheen(odd), ..all(odd) }, [2048, 1]),
+        ("coloured lobes", Filter::Clusters, two(), Maps { specular: sheen(few), ..all(few) }, [2048, 1]),
         ("ggx", Filter::Fournier4, metal(), all(few), [256, 6]),
         ("two lobes", Filter::Fournier7, two(), all(few), [256, 6]),
         ("one lobe", Filter::BruteForce, lobes(&[(0.0, 60.0)]), all(few), [64, 40]),
@@ -195,8 +236,27 @@ fn clusters_are_nearer_to_the_truth_than_cells() {
 }
 
 #[test]
+fn lobes_keep_the_colours_that_go_together_with_them() {
+    let lamp = Light::Point { position: [0.5, 1.0, 1.2], intensity: [1.0; 3] };
+    let mut scene = plane("checker", lobes(&[(0.0, 100.0)]), lamp);
+    let (kappa, _) = scene.materials[0].maps.roughness.clone().unwrap();
+    let [w, h] = kappa.size();
+    // Rough places are dark, sharp ones gold.
+    let at = |i: u32| DVec2::new((f64::from(i % w) + 0.5) / f64::from(w), 1.0 - (f64::from(i / w) + 0.5) / f64::from(h));
+    let colour = |i: u32| if kappa.sample(at(i), 0.0).x > 200.0 { [0.9, 0.7, 0.2] } else { [0.1; 3] };
+    let colours = Texture::colour([w, h], &(0..w * h).map(colour).collect::<Vec<_>>()).unwrap();
+    scene.materials[0].maps.specular = Some(Arc::new(colours));
+    let minified = Minified::new(scene, 24);
+    // Every lobe, under the mean colour.
+    let all = [Filter::Clusters, Filter::BruteForce, Filter::Vmf8, Filter::Naive];
+    let [clusters, bruteforce, vmf8, naive] = all.map(|filter| minified.error(filter));
+    println!("gold and dark: clusters {clusters:.3}, bruteforce {bruteforce:.3}, vmf8 {vmf8:.3}, naive {naive:.3}");
+    assert!(clusters < 0.2 && clusters < 0.7 * bruteforce && clusters < 0.7 * naive && clusters < 0.3 * vmf8);
+}
+
+#[test]
 fn what_a_filter_cannot_do_is_refused() {
-    let scene = materials();
+    let scene = materials(plain());
     for filter in [Filter::Fournier4, Filter::Fournier7] {
         let refused = Config { filter, anisotropy: 4, ..config([8, 8], Estimator::Mis, 2) };
         let options = Options { device: Some(DEVICE.into()), validate: false };

@@ -6,6 +6,7 @@
 #include "stereographic.glsl"
 
 const uint MOST_CLUSTERS = 8u;
+const uint MOST_COLOURED = 4u;
 
 // Lengths are stored this many times as long, squares by its square: numbers of 16 bits would lose the variance of sharp lobes.
 const float CLUSTER_LENGTH = 16.0;
@@ -20,6 +21,11 @@ struct Cluster {
 layout(set = 2, binding = CLUSTERS_BINDING, std430) readonly buffer Clusters {
     Cluster clusters[];
 };
+
+// The layer of the colour of the ith of `all`, behind those of moments.
+uint clusters_colour(uint i, uint all, uint upright) {
+    return all + (upright != 0u ? (all + 1u) / 2u : all) + i;
+}
 
 // The one of `count` from `first` on that takes a lobe at s with the variance `own` = 1 / kappa.
 uint cluster_of(uint first, uint count, vec2 s, float own) {

@@ -58,6 +58,21 @@ float found_stretch(uvec4 u) {
     return exp2(float(u.y & 1023u) * (0.5 * FOUND_MOST_RATIO / FOUND_RATIOS));
 }
 
+// Colours of the first four lobes over that of the place, in 32 bits each (9 of each component, a common exponent), are in the last layer
+// where lobes say so.
+const uint FOUND_COLOURED = 0x8000u;
+
+uint found_pack_colour(vec3 c) {
+    c = clamp(c, 0.0, 65000.0);
+    int exponent = clamp(int(floor(log2(max(max(c.r, c.g), max(c.b, 1e-5))))) + 1, -15, 16);
+    uvec3 parts = min(uvec3(c * exp2(float(9 - exponent)) + 0.5), uvec3(511u));
+    return parts.r | parts.g << 9 | parts.b << 18 | uint(exponent + 15) << 27;
+}
+
+vec3 found_colour(uint u) {
+    return vec3(u & 511u, u >> 9 & 511u, u >> 18 & 511u) * exp2(float(u >> 27) - 24.0);
+}
+
 bool found_none(uvec4 u) {
     return (u.w & 0xffffu) == 0u;
 }
@@ -75,7 +90,7 @@ float found_concentration(uvec4 u) {
 }
 
 float found_weight(uvec4 u) {
-    return unpackHalf2x16(u.w & 0xffffu).x;
+    return unpackHalf2x16(u.w & 0x7fffu).x;
 }
 
 #endif

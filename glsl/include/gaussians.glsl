@@ -24,7 +24,7 @@ void decode_gaussians(ivec2 p, MapRecord record, vec2 uv, Reach r, inout Found f
             if (!upright) {
                 below = stereographic_direction(look_up(CELL_CLASSES, record.cells, GAUSSIANS + i, uv, r).xy / q);
             }
-            keep_ellipse(p, f, Ellipse(mu, x, scale * scale / variance, 1.0), q, shared_of.w, below);
+            keep_ellipse(p, f, Ellipse(mu, x, scale * scale / variance, 1.0), q, shared_of.w, below, 0u);
             sum += mu * q;
             mass += q;
         }

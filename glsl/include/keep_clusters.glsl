@@ -2,7 +2,7 @@
 // Part of filter.comp.
 
 // `own` is 1 / kappa of the lobes below: what is wider than that is the spread of their normals.
-void keep_ellipse(ivec2 p, inout Found f, Ellipse e, float mass, float own, vec3 normal) {
+void keep_ellipse(ivec2 p, inout Found f, Ellipse e, float mass, float own, vec3 normal, uint flags) {
     if (f.count >= LOBES) {
         return;
     }
@@ -12,6 +12,7 @@ void keep_ellipse(ivec2 p, inout Found f, Ellipse e, float mass, float own, vec3
     float kappa = sqrt(along * across), share = mass * moments_area(kappa, f.lobes) / f.area;
     vec3 mu = f.frame * moments_direction(e.mu), below = f.frame * moments_direction(normal);
     uvec4 lobe = found_pack_along(mu, f.frame * e.axis, sqrt(across / along), 1.0 / max(own * across, 1e-12), below, kappa, share);
+    lobe.w |= flags;
     imageStore(lobes, ivec3(p, int(f.count)), lobe);
     f.count += 1u;
     f.sharpest = share > MATTERS ? max(f.sharpest, across) : f.sharpest;
@@ -24,7 +25,12 @@ void decode_clusters(ivec2 p, MapRecord record, vec2 uv, Reach r, uint lobe_laye
         firsts[i] = vec4(0.0);
         seconds[i] = vec4(0.0);
     }
+    vec3 thirds[MOST_COLOURED];
+    for (uint i = 0u; i < MOST_COLOURED; ++i) {
+        thirds[i] = vec3(0.0);
+    }
     uint first = record.clusters.x, all = record.clusters.y;
+    bool coloured = COLOURED && record.clusters.z != 0u;
     float coarse = min(r.level, 1.0), level = max(r.level - 1.0, 0.0);
     for (float tap = 0.0; tap < r.taps; ++tap) {
         vec2 at = reach_tap(r, uv, tap);
@@ -43,6 +49,9 @@ void decode_clusters(ivec2 p, MapRecord record, vec2 uv, Reach r, uint lobe_laye
                 firsts[i + 1u] += fetch(CELL_CLASSES, record.cells, i + 1u, at, level) * (i + 1u < all ? share : 0.0);
             }
         }
+        for (uint i = 0u; i < (coloured ? min(all, MOST_COLOURED) : 0u); ++i) {
+            thirds[i] += fetch(CELL_CLASSES, record.cells, clusters_colour(i, all, record.upright), at, level).rgb * share;
+        }
         vec2 place = vec2(at.x, 1.0 - at.y) * r.size - 0.5, corner_of = floor(place), part = place - corner_of;
         // Base texels, where they count.
         for (uint k = 0u; k < (coarse < 1.0 ? 4u : 0u); ++k) {
@@ -50,6 +59,10 @@ void decode_clusters(ivec2 p, MapRecord record, vec2 uv, Reach r, uint lobe_laye
             vec2 centre = (corner_of + corner + 0.5) / r.size, below = vec2(0.0);
             for (uint j = record.upright; j < 1u; ++j) {
                 below = stereographic_of(fetch(MOMENT_CLASSES, record.moments, 0u, vec2(centre.x, 1.0 - centre.y), 0.0).xyz);
+            }
+            vec3 colour = vec3(0.0);
+            if (coloured) {
+                colour = fetch(MOMENT_CLASSES, record.moments, lobe_layer + record.count, vec2(centre.x, 1.0 - centre.y), 0.0).rgb;
             }
             for (uint j = 0u; j < record.count; ++j) {
                 vec4 lobe = fetch(MOMENT_CLASSES, record.moments, lobe_layer + j, vec2(centre.x, 1.0 - centre.y), 0.0);
@@ -60,6 +73,9 @@ void decode_clusters(ivec2 p, MapRecord record, vec2 uv, Reach r, uint lobe_laye
                     firsts[i] += mine ? placed.first : vec4(0.0);
                     seconds[i] += mine ? vec4(placed.second, below * placed.first.x) : vec4(0.0);
                 }
+                for (uint i = 0u; i < (coloured ? MOST_COLOURED : 0u); ++i) {
+                    thirds[i] += i == placed.cluster ? colour * placed.first.x : vec3(0.0);
+                }
             }
         }
     }
@@ -67,15 +83,24 @@ void decode_clusters(ivec2 p, MapRecord record, vec2 uv, Reach r, uint lobe_laye
     vec3 sum = vec3(0.0);
     float mass = 0.0;
     f.area = record.facing;
+    uvec4 colours = uvec4(0u);
     for (uint i = 0u; i < CLUSTERS; ++i) {
         float q = i < all ? firsts[i].x : 0.0;
         if (q > LEAST_WEIGHT) {
             Cluster c = clusters[first + i];
             Ellipse e = cluster_decode(c, firsts[i], seconds[i].xy);
-            keep_ellipse(p, f, e, q, c.own.x, record.upright != 0u ? e.mu : stereographic_direction(seconds[i].zw / q));
+            if (coloured && i < MOST_COLOURED) {
+                vec3 colour = thirds[min(i, MOST_COLOURED - 1u)] / q;
+                colours[min(f.count, 3u)] = found_pack_colour(mix(vec3(1.0), colour / max(f.specular, 1e-6), greaterThan(f.specular, vec3(1e-6))));
+            }
+            vec3 below = record.upright != 0u ? e.mu : stereographic_direction(seconds[i].zw / q);
+            keep_ellipse(p, f, e, q, c.own.x, below, coloured ? FOUND_COLOURED : 0u);
             sum += e.mu * q;
             mass += q;
         }
+    }
+    if (coloured) {
+        imageStore(lobes, ivec3(p, int(LOBES) - 1), colours);
     }
     f.mean = record.upright != 0u ? sum / max(mass, LEAST_WEIGHT) : normal;
 }

@@ -13,8 +13,9 @@ layout(constant_id = 7) const uint LOBED = 0u;
 // Whether lobes are Gaussians of slopes, and how these are masked: as V-cavities or by Smith's factor.
 layout(constant_id = 8) const uint SLOPES = 0u;
 layout(constant_id = 9) const uint SMITH = 0u;
-// Whether lobes of directions are elliptic.
+// Whether lobes of directions are elliptic, and, if it is 2, some of colours of their own.
 layout(constant_id = 11) const uint ELLIPTIC = 0u;
+const bool COLOURED = ELLIPTIC == 2u;
 
 // As found.glsl packs them, all 0 after the last. Slopes, two layers each: mean, weight; covariance xx, xy, yy.
 layout(set = 2, binding = LOBES_BINDING) uniform usampler2DArray lobes_found;
@@ -35,6 +36,9 @@ vec3 lobe_across[LAYERS];
 vec3 lobe_follow[LAYERS];
 // What turns the lobe's direction to the normal: the axis times the sine, the cosine.
 vec4 lobe_turn[LAYERS];
+
+// Coloured: the specular colour.
+vec3 lobe_colour[LAYERS];
 
 // The sample's lobes, with those.
 struct Lobes {
@@ -80,6 +84,10 @@ Lobes lobes_load(ivec2 p, Local f, Material m) {
             l.count += 1u;
         }
     } else {
+        uvec4 colours = uvec4(0u);
+        if (COLOURED) {
+            colours = texelFetch(lobes_found, ivec3(p, int(LAYERS) - 1), 0);
+        }
         for (uint i = 0u; i < LAYERS; ++i) {
             uvec4 found = texelFetch(lobes_found, ivec3(p, int(i)), 0);
             if (found_none(found)) {
@@ -94,6 +102,10 @@ Lobes lobes_load(ivec2 p, Local f, Material m) {
             lobe_axis[i] = vec4(mu, max(dot(normal, f.view), FACING));
             lobe_shape[i] = vec4(a, peak, found_weight(found) * total, height);
             lobe_normal[i] = normal;
+            if (COLOURED) {
+                bool own = (found.w & FOUND_COLOURED) != 0u;
+                lobe_colour[i] = m.record.f0.rgb * (own ? found_colour(colours[min(i, 3u)]) : vec3(1.0));
+            }
             if (ELLIPTIC != 0u) {
                 vec3 x, y;
                 tangent_basis(centre, x, y);
@@ -148,6 +160,8 @@ vec4 lobes_evaluate(Material m, Lobes l, vec3 wi, vec3 wo, vec3 h) {
     uint kind = m.record.kind.x;
     bool ggx = kind == REFLECTANCE_GGX, cosine = kind == REFLECTANCE_BLINN_PHONG;
     float across = dot(wo, h);
+    float c = clamp(1.0 - across, 0.0, 1.0), c2 = c * c, grazing = c2 * c2 * c;
+    vec3 coloured = vec3(0.0);
     float specular = 0.0, diffuse = 0.0, density = 0.0, weights = 0.0;
     if (SLOPES != 0u) {
         vec3 t = to_tangent(m, h), ti = to_tangent(m, wi), to = to_tangent(m, wo);
@@ -206,6 +220,10 @@ vec4 lobes_evaluate(Material m, Lobes l, vec3 wi, vec3 wo, vec3 h) {
                              : min(0.25 / (ci * co), 0.5 * max(dot(normal, h), 0.0) / (across * max(ci, co)));
             float lit_weight = lit ? shape.z * ci : 0.0;
             specular += normals * open * lit_weight;
+            if (COLOURED) {
+                vec3 own = lobe_colour[i];
+                coloured += (ggx ? own + (1.0 - own) * grazing : own) * (normals * open * lit_weight);
+            }
             diffuse += shape.z * mean;
             density += shape.z * (ggx || cosine ? normals * ch : shape.w * whole * exp(exponent));
             weights += shape.z;
@@ -216,12 +234,11 @@ vec4 lobes_evaluate(Material m, Lobes l, vec3 wi, vec3 wo, vec3 h) {
     vec3 f = m.record.f0.rgb;
     vec3 below = m.record.albedo.rgb;
     if (ggx) {
-        float c = clamp(1.0 - across, 0.0, 1.0), c2 = c * c;
-        f += (1.0 - f) * (c2 * c2 * c);
+        f += (1.0 - f) * grazing;
         below *= 1.0 - f;
     }
     // The weights of a reflectance of lobes are its colour's, not its base's.
-    return vec4(f * specular + below * (INV_PI * diffuse / weights), density);
+    return vec4((COLOURED ? coloured : f * specular) + below * (INV_PI * diffuse / weights), density);
 }
 
 // A direction of lobe i: of GGX's or a cosine power's density of normals times the cosine, or of the lobe itself.

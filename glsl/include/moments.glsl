@@ -7,7 +7,8 @@
 //   clusters:                            of a base texel each lobe as naive has it; from level 1 on, in images of half the size and of
 //                                        numbers of 16 bits, the moments of each cluster, as clusters.glsl has them: mass, x, y, xx;
 //                                        then xy, yy of two clusters in a layer, or, if lobes are not about the normal, of each with
-//                                        its normal
+//                                        its normal; then, where specular colours go together with lobes, mass times the colour of
+//                                        each. Base texels have theirs in the layer behind their lobes
 //   fournier4, fournier7:                the same of a base texel; from level 1 on, in images of half the size, lobes of each texel:
 //                                        direction as oct.glsl has it, concentration, mass, which is 0 of none; then, if
 //                                        lobes are not about the normal, the normals of as many

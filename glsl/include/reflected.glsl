@@ -97,6 +97,9 @@ ReflectedLobe reflected_found(Material m, Lobes l, uint i, vec3 wo) {
         open = 1.0 / (ggx_masking(ci, lobe_shape[i].x) * ggx_masking(lobe_axis[i].w, lobe_shape[i].x));
     }
     vec3 f = m.record.f0.rgb;
+    if (COLOURED) {
+        f = lobe_colour[i];
+    }
     if (ggx) {
         float c = clamp(1.0 - cosine_to, 0.0, 1.0), c2 = c * c;
         f += (1.0 - f) * (c2 * c2 * c);

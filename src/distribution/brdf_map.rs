@@ -4,7 +4,7 @@
 use crate::distribution::effective::{self, Rule};
 use crate::distribution::vmf::{self, Lobe};
 use crate::error::{Error, Result};
-use crate::material::Material;
+use crate::material::{Material, unit};
 use crate::texture::{MAX_SIDE, Texture, for_each_cover};
 use glam::{DVec2, DVec3};
 
@@ -19,6 +19,8 @@ pub struct BrdfMap {
     lobes: Vec<Lobe>,
     /// Of each texel, if its lobes are about other directions.
     normals: Vec<DVec3>,
+    /// Factors on the specular colour of each texel, if these are known.
+    colours: Vec<DVec3>,
 }
 
 impl BrdfMap {
@@ -51,7 +53,7 @@ impl BrdfMap {
                 return Err(Error::invalid(format!("brdf map.texel {i}"), "weights of sum 1", sum));
             }
         }
-        Ok(Self { size, lobes_per_texel, lobes, normals: Vec::new() })
+        Ok(Self { size, lobes_per_texel, lobes, normals: Vec::new(), colours: Vec::new() })
     }
 
     /// The map of a material: at each texel its base lobes under the normals and the roughness that its maps have there. Where
@@ -69,14 +71,14 @@ impl BrdfMap {
         let count = size[0] as usize * size[1] as usize;
         let mut normals = vec![DVec3::Z; count];
         if let Some(map) = &material.maps.normal {
-            let all = texels(map, |xy| xy.extend((1.0 - xy.length_squared()).max(0.0).sqrt()).normalize());
+            let all = texels(map, |xyz| unit(xyz.truncate()));
             for_each_cover(map.size(), size, |i, covered| {
                 normals[i] = covered.iter().map(|(from, share)| all[*from] * *share).sum();
             });
         }
         let mut bases = vec![];
         if let Some((map, kind)) = &material.maps.roughness {
-            let all = texels(map, |xy| material.model.roughness_from(*kind, xy.x));
+            let all = texels(map, |value| material.model.roughness_from(*kind, value.x));
             let all = all.into_iter().map(|roughness| base(Some(roughness))).collect::<Result<Vec<_>>>()?;
             for_each_cover(map.size(), size, |_, covered| {
                 bases.extend(plain.iter().enumerate().map(|(k, lobe)| {
@@ -89,7 +91,16 @@ impl BrdfMap {
         let lobes = (0..count).flat_map(|i| effective::lobes(of_texel(i), normals[i], rule)).collect();
         let normals = if plain.iter().all(|l| l.mu.z > UPRIGHT) { Vec::new() } else { normals };
         let normals = normals.into_iter().map(|n| n.try_normalize().unwrap_or(DVec3::Z)).collect();
-        Ok(Self { size, lobes_per_texel: plain.len(), lobes, normals })
+        Ok(Self { size, lobes_per_texel: plain.len(), lobes, normals, colours: Vec::new() })
+    }
+
+    /// The same with the mean of a map of specular colours over each texel.
+    pub(crate) fn coloured(mut self, map: &Texture) -> Self {
+        let all = texels(map, |colour| colour);
+        for_each_cover(map.size(), self.size, |_, covered| {
+            self.colours.push(covered.iter().map(|(from, share)| all[*from] * *share).sum());
+        });
+        self
     }
 
     /// Width and height in texels.
@@ -112,6 +123,11 @@ impl BrdfMap {
         self.normals.get(i).copied()
     }
 
+    /// The factor on the specular colour of texel `i`, if it is known.
+    pub(crate) fn colour(&self, i: usize) -> Option<DVec3> {
+        self.colours.get(i).copied()
+    }
+
     /// The lobes of texel `i`; none beyond the last.
     pub fn texel(&self, i: usize) -> &[Lobe] {
         self.lobes.get(i * self.lobes_per_texel..(i + 1) * self.lobes_per_texel).unwrap_or_default()
@@ -124,11 +140,11 @@ fn check_size(size: [u32; 2]) -> Result<()> {
     if right { Ok(()) } else { Err(Error::invalid("brdf map size", expected(), format!("{}x{}", size[0], size[1]))) }
 }
 
-/// What `of` makes of the first two components of each texel.
-fn texels<T>(map: &Texture, of: impl Fn(DVec2) -> T) -> Vec<T> {
+/// What `of` makes of the first three components of each texel.
+fn texels<T>(map: &Texture, of: impl Fn(DVec3) -> T) -> Vec<T> {
     let [w, h] = map.size();
     let at = |x: u32, y: u32| DVec2::new((f64::from(x) + 0.5) / f64::from(w), 1.0 - (f64::from(y) + 0.5) / f64::from(h));
-    (0..h).flat_map(|y| (0..w).map(move |x| [x, y])).map(|[x, y]| of(map.sample(at(x, y), 0.0).truncate().truncate())).collect()
+    (0..h).flat_map(|y| (0..w).map(move |x| [x, y])).map(|[x, y]| of(map.sample(at(x, y), 0.0).truncate())).collect()
 }
 
 #[cfg(test)]

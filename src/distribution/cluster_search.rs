@@ -1,7 +1,7 @@
 //! Where a map's clusters are: by its lobes at some thousand texels, and as many clusters as bring the error down that is measured
 //! over blocks of texels against all their lobes. Nothing is random: the same map has the same clusters.
 
-use crate::distribution::clusters::{Cluster, Clusters, MOMENTS, MOST_CLUSTERS, Placed};
+use crate::distribution::clusters::{Cluster, Clusters, Layout, MOMENTS, MOST_CLUSTERS, Placed};
 use crate::distribution::vmf::Lobe;
 use crate::sampling::sobol;
 use glam::{DVec2, DVec3};
@@ -28,6 +28,9 @@ const AS_GOOD: [f64; 2] = [1.05, 0.01];
 /// The lobes of a texel of a map, row by row.
 pub(crate) type Texels<'a> = dyn Fn(usize) -> Vec<Lobe> + 'a;
 
+/// The factor on their specular colour.
+pub(crate) type Colours<'a> = dyn Fn(usize) -> DVec3 + 'a;
+
 #[derive(Clone, Copy)]
 struct Sample {
     placed: Placed,
@@ -43,14 +46,16 @@ struct Class {
 /// Texels below a coarser one.
 struct Block {
     size: usize,
-    lobes: Vec<Lobe>,
-    /// Half vectors, and the exact density there.
-    half: Vec<(DVec3, f64)>,
+    /// With the factors on their colours.
+    lobes: Vec<(Lobe, DVec3)>,
+    /// Half vectors, and the exact density there times these.
+    half: Vec<(DVec3, DVec3)>,
 }
 
 impl Clusters {
-    /// Those of a map of `size`; with `normals` texels keep these, too.
-    pub(crate) fn of([width, height]: [u32; 2], normals: bool, texels: &Texels<'_>) -> Self {
+    /// Those of a map of `size`. With `normals` texels keep these, too; and `colours`, if there are some, where these and fewer clusters
+    /// are nearer than the mean colour and more of them.
+    pub(crate) fn of([width, height]: [u32; 2], normals: bool, texels: &Texels<'_>, colours: Option<&Colours<'_>>) -> Self {
         let all = width.saturating_mul(height);
         let at = |i: u32| match all <= TEXELS {
             true => i as usize,
@@ -61,8 +66,9 @@ impl Clusters {
         };
         let lobes = (0..all.min(TEXELS)).flat_map(|i| texels(at(i)));
         let classes = classes(lobes.map(|l| Sample { placed: Placed::of(&l), weight: l.weight }).collect());
-        let blocks = blocks([width, height], texels);
-        let most = Self::most(normals);
+        let blocks = blocks([width, height], texels, colours.unwrap_or(&|_| DVec3::ONE));
+        let plain = Layout { normals, colours: false };
+        let most = plain.most();
         let best = match classes.as_slice() {
             [one] => (1..=most).map(|k| fit(one, k, &blocks)).collect(),
             [rough, sharp] => {
@@ -72,17 +78,21 @@ impl Clusters {
             }
             _ => Vec::new(),
         };
-        chosen(best, normals, &blocks)
+        let coloured = Layout { normals, colours: true };
+        let few = best.iter().filter(|c| colours.is_some() && c.len() <= coloured.most()).cloned().map(|c| (c, coloured));
+        let few: Vec<_> = few.collect();
+        chosen(best.into_iter().map(|c| (c, plain)).chain(few), &blocks).unwrap_or_else(|| Self::new(Vec::new(), plain))
     }
 }
 
-/// The fewest of `candidates` that are about as good as the best.
-fn chosen(candidates: Vec<Vec<Cluster>>, normals: bool, blocks: &[Block]) -> Clusters {
-    let mut all: Vec<_> = candidates.into_iter().map(|c| (c.len(), error(&c, blocks), c)).collect();
+/// The one of `candidates` with the least bytes that is about as good as the best.
+fn chosen(candidates: impl Iterator<Item = (Vec<Cluster>, Layout)>, blocks: &[Block]) -> Option<Clusters> {
+    let all = candidates.map(|(clusters, layout)| Clusters::new(clusters, layout));
+    let mut all: Vec<_> = all.map(|c| (c.bytes(), error(&c, blocks), c)).collect();
     let least = all.iter().map(|c| c.1).fold(f64::INFINITY, f64::min);
     let enough = (least * AS_GOOD[0]).max(AS_GOOD[1]);
     all.sort_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
-    Clusters::new(all.into_iter().find(|c| c.1 <= enough).map(|c| c.2).unwrap_or_default(), normals)
+    all.into_iter().find(|c| c.1 <= enough).map(|c| c.2)
 }
 
 /// One class, or a rough one and a sharp one.
@@ -116,7 +126,7 @@ fn fit(class: &Class, k: usize, blocks: &[Block]) -> Vec<Cluster> {
         let by_density = rounds(&class.samples, by_distance.clone(), true);
         for found in [by_distance, by_density] {
             let found: Vec<_> = found.into_iter().map(|c| Cluster { bound: class.bound, ..c }.rounded()).collect();
-            let off = error(&found, &own);
+            let off = error(&Clusters::new(found.clone(), Layout::default()), &own);
             if off < best.0 || best.1.is_empty() {
                 best = (off, found);
             }
@@ -197,7 +207,7 @@ fn of_moments([q, x, y, xx, xy, yy, ..]: [f64; MOMENTS], floor: f64, by_density:
 }
 
 /// Blocks spread over the map.
-fn blocks([width, height]: [u32; 2], texels: &Texels<'_>) -> Vec<Block> {
+fn blocks([width, height]: [u32; 2], texels: &Texels<'_>, colours: &Colours<'_>) -> Vec<Block> {
     let block = |size: usize, number: u32| {
         let side = SIDES[size];
         let [w, h] = [width, height].map(|all| side.min(all));
@@ -208,9 +218,11 @@ fn blocks([width, height]: [u32; 2], texels: &Texels<'_>) -> Vec<Block> {
                 true => [i % w, i / w],
                 false => sobol::point(i, hash([number, size as u32])).map(|u| (f64::from(side) * sobol::to_unit(u)) as u32),
             };
-            texels(((corner[1] + y.min(h - 1)) * width + corner[0] + x.min(w - 1)) as usize)
+            let texel = ((corner[1] + y.min(h - 1)) * width + corner[0] + x.min(w - 1)) as usize;
+            let colour = colours(texel);
+            texels(texel).into_iter().map(move |lobe| (lobe, colour))
         });
-        let lobes: Vec<Lobe> = inside.collect();
+        let lobes: Vec<_> = inside.collect();
         Block { size, half: half_vectors(&lobes, number), lobes }
     };
     (0..SIDES.len()).flat_map(|size| (0..BLOCKS).map(move |number| block(size, number))).collect()
@@ -221,48 +233,50 @@ fn hash([number, size]: [u32; 2]) -> u32 {
 }
 
 /// Half vectors drawn from the lobes, one in four from anywhere.
-fn half_vectors(lobes: &[Lobe], number: u32) -> Vec<(DVec3, f64)> {
-    let any = Lobe { mu: DVec3::Z, kappa: 2.0, weight: 1.0 };
-    let exact = |h| lobes.iter().map(|l| l.density(h)).sum::<f64>() / mass(lobes);
+fn half_vectors(lobes: &[(Lobe, DVec3)], number: u32) -> Vec<(DVec3, DVec3)> {
+    let any = (Lobe { mu: DVec3::Z, kappa: 2.0, weight: 1.0 }, DVec3::ONE);
     let half = |j: u32| {
         let [a, b] = sobol::point(j, sobol::hash(number)).map(sobol::to_unit);
         let drawn = sobol::to_unit(sobol::random(j, number)[0]) * lobes.len() as f64;
-        let h = lobes.get(drawn as usize).filter(|_| !j.is_multiple_of(4)).unwrap_or(&any).sample([a, b]);
-        (h, exact(h))
+        let h = lobes.get(drawn as usize).filter(|_| !j.is_multiple_of(4)).unwrap_or(&any).0.sample([a, b]);
+        (h, exact(lobes, h))
     };
     (0..HALF_VECTORS).map(half).collect()
 }
 
-fn mass(lobes: &[Lobe]) -> f64 {
-    lobes.iter().map(|l| l.weight).sum::<f64>().max(f64::MIN_POSITIVE)
+/// Densities of lobes at `h` with their colours, of a weight of 1 in all.
+fn exact(lobes: &[(Lobe, DVec3)], h: DVec3) -> DVec3 {
+    let weight = lobes.iter().map(|(l, _)| l.weight).sum::<f64>().max(f64::MIN_POSITIVE);
+    lobes.iter().map(|(l, colour)| l.density(h) * *colour).sum::<DVec3>() / weight
 }
 
 impl Block {
     /// Its lobes of one class.
     fn of_class(&self, bound: f64) -> Option<Self> {
         let class = Cluster { bound, inverse: [0.0; 3], ..round(DVec2::ZERO) };
-        let lobes: Vec<_> = self.lobes.iter().filter(|l| class.distance(&Placed::of(l)) < 1.0).copied().collect();
-        let exact = |h| lobes.iter().map(|l| l.density(h)).sum::<f64>() / mass(&lobes);
-        let half = self.half.iter().map(|(h, _)| (*h, exact(*h))).collect();
+        let lobes: Vec<_> = self.lobes.iter().filter(|(l, _)| class.distance(&Placed::of(l)) < 1.0).copied().collect();
+        let half = self.half.iter().map(|(h, _)| (*h, exact(&lobes, *h))).collect();
         (!lobes.is_empty()).then_some(Self { size: self.size, half, lobes })
     }
 }
 
-/// The relative L2 error of the density, in the mean over the sizes of blocks.
-fn error(clusters: &[Cluster], blocks: &[Block]) -> f64 {
-    let clusters = Clusters::new(clusters.to_vec(), false);
+/// The relative L2 error of the density times colours, in the mean over the sizes of blocks. Lobes whose colours are not kept have the
+/// mean of the block's.
+fn error(clusters: &Clusters, blocks: &[Block]) -> f64 {
     let mut sums = [[0.0f64; 2]; SIDES.len()];
     for block in blocks {
         let mut texel = [0.0; MOMENTS * MOST_CLUSTERS];
-        for lobe in &block.lobes {
-            let (i, moments) = clusters.encode(lobe, None, lobe.weight);
+        let mut mean = (DVec3::ZERO, f64::MIN_POSITIVE);
+        for (lobe, colour) in &block.lobes {
+            mean = (mean.0 + lobe.weight * *colour, mean.1 + lobe.weight);
+            let (i, moments) = clusters.encode(lobe, None, *colour, lobe.weight);
             texel[i * MOMENTS..].iter_mut().zip(moments).for_each(|(sum, m)| *sum += m);
         }
         let (lobes, _) = clusters.decode(&texel);
         for (h, exact) in &block.half {
-            let found: f64 = lobes.iter().map(|l| l.lobe.density(*h)).sum();
+            let found: DVec3 = lobes.iter().map(|l| l.lobe.density(*h) * l.colour.unwrap_or(mean.0 / mean.1)).sum();
             let sum = &mut sums[block.size];
-            *sum = [sum[0] + (found - exact).powi(2), sum[1] + exact * exact];
+            *sum = [sum[0] + (found - *exact).length_squared(), sum[1] + exact.length_squared()];
         }
     }
     sums.iter().map(|[off, all]| (off / all.max(f64::MIN_POSITIVE)).sqrt()).sum::<f64>() / SIDES.len() as f64
@@ -282,19 +296,33 @@ mod tests {
         let checker = |i: usize| lobe(0.0, 0.0, if (i / 4 + i / 256).is_multiple_of(2) { 24.0 } else { 768.0 });
         let side = |i: usize| if i.is_multiple_of(2) { 0.3 } else { -0.3 };
         let facets = |i: usize| lobe(side(i), side(i / 64), 900.0);
-        let of = |texels: &Texels<'_>| Clusters::of([64; 2], false, texels);
+        let of = |texels: &Texels<'_>| Clusters::of([64; 2], false, texels, None);
         assert_eq!([of(&flat), of(&checker), of(&facets)].map(|c| c.all().len()), [1, 2, 4]);
         let two = of(&checker);
         assert!(two.all()[0].bound == -two.all()[1].bound && two.all()[0].bound > 0.0, "{two:?}");
     }
 
     #[test]
+    fn colours_are_kept_where_they_go_together_with_lobes() {
+        let checker = |i: usize| (i / 4 + i / 256).is_multiple_of(2);
+        let lobes = |i: usize| lobe(0.0, 0.0, if checker(i) { 24.0 } else { 768.0 });
+        let gold = DVec3::new(0.9, 0.6, 0.2);
+        let together = |i: usize| if checker(i) { DVec3::splat(0.3) } else { gold };
+        let apart = |i: usize| if i.is_multiple_of(2) { DVec3::splat(0.3) } else { gold };
+        let of = |colours: &Colours<'_>| Clusters::of([64; 2], false, &lobes, Some(colours));
+        assert_eq!(
+            [of(&together), of(&apart), of(&|_| gold)].map(|c| (c.all().len(), c.layout().colours)),
+            [(2, true), (2, false), (2, false)]
+        );
+    }
+
+    #[test]
     fn the_same_map_has_the_same_clusters() {
         let waves = |i: usize| lobe(0.5 * (0.3 * i as f64).sin(), 0.5 * (0.041 * i as f64).cos(), 60.0);
-        let of = || Clusters::of([67, 45], true, &waves);
+        let of = || Clusters::of([67, 45], true, &waves, None);
         assert_eq!(of(), of());
         assert!(of().all().len() > 2 && of().bytes() <= 96);
         // One texel is enough.
-        assert_eq!(Clusters::of([1, 1], false, &waves).all().len(), 1);
+        assert_eq!(Clusters::of([1, 1], false, &waves, None).all().len(), 1);
     }
 }

@@ -10,14 +10,18 @@ use crate::distribution::vmf::Lobe;
 use glam::{DVec2, DVec3};
 
 /// Numbers of a cluster in a texel: mass; mass times place in the plane from the cluster's centre, x and y; mass times mean products
-/// xx, xy, yy of these, with the lobes' own variance; mass times the place of the normal below, x and y, where lobes are not about it.
-pub const MOMENTS: usize = 8;
+/// xx, xy, yy of these, with the lobes' own variance; mass times the place of the normal below, x and y, where lobes are not about it;
+/// mass times the factor on the specular colour, where that is kept.
+pub const MOMENTS: usize = 11;
 
 /// The most clusters of a map: 96 bytes a texel in numbers of 16 bits.
 pub const MOST_CLUSTERS: usize = 8;
 
 /// The same with normals.
 pub const MOST_WITH_NORMALS: usize = 6;
+
+/// The same with colours.
+pub const MOST_WITH_COLOURS: usize = 4;
 
 /// Lobes of less concentration count as this.
 const LEAST_CONCENTRATION: f64 = 0.25;
@@ -46,8 +50,16 @@ pub struct Cluster {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Clusters {
     all: Vec<Cluster>,
-    /// Whether lobes are not about the normals below, which are kept, too.
-    normals: bool,
+    layout: Layout,
+}
+
+/// What is kept beside moments.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Layout {
+    /// Normals, as lobes are not about them.
+    pub normals: bool,
+    /// Specular colours, as they go together with lobes.
+    pub colours: bool,
 }
 
 /// A lobe that is decoded.
@@ -59,6 +71,8 @@ pub struct Decoded {
     pub normal: DVec3,
     /// The concentration of the lobes below: what is wider than that is the spread of their normals.
     pub own: f64,
+    /// The factor on its specular colour, where that is kept.
+    pub colour: Option<DVec3>,
 }
 
 /// A lobe in the plane.
@@ -104,7 +118,7 @@ impl Cluster {
     pub(crate) fn moments(&self, lobe: &Placed, q: f64) -> [f64; MOMENTS] {
         let d = lobe.at - self.centre;
         let v = lobe.variance;
-        [q, q * d.x, q * d.y, q * (d.x * d.x + v), q * d.x * d.y, q * (d.y * d.y + v), 0.0, 0.0]
+        [q, q * d.x, q * d.y, q * (d.x * d.x + v), q * d.x * d.y, q * (d.y * d.y + v), 0.0, 0.0, 0.0, 0.0, 0.0]
     }
 
     /// The lobe of these moments, of weight 1.
@@ -124,17 +138,17 @@ impl Cluster {
 
 impl Clusters {
     /// At least one, of which no more than [`Self::most`] count.
-    pub(crate) fn new(mut all: Vec<Cluster>, normals: bool) -> Self {
-        all.truncate(Self::most(normals));
+    pub(crate) fn new(mut all: Vec<Cluster>, layout: Layout) -> Self {
+        all.truncate(layout.most());
         if all.is_empty() {
             all.push(Cluster { centre: DVec2::ZERO, inverse: [1.0, 0.0, 1.0], constant: 0.0, floor: 1e-9, own: 0.0, bound: 0.0 });
         }
-        Self { all: all.into_iter().map(Cluster::rounded).collect(), normals }
+        Self { all: all.into_iter().map(Cluster::rounded).collect(), layout }
     }
 
-    /// The most clusters with normals or without.
-    pub(crate) fn most(normals: bool) -> usize {
-        if normals { MOST_WITH_NORMALS } else { MOST_CLUSTERS }
+    /// What is kept beside moments.
+    pub fn layout(&self) -> Layout {
+        self.layout
     }
 
     /// They.
@@ -144,7 +158,7 @@ impl Clusters {
 
     /// Bytes of a texel, as it is stored.
     pub fn bytes(&self) -> usize {
-        layers(self.all.len(), self.normals) * 8
+        self.layout.layers(self.all.len()) * 8
     }
 
     /// That of a lobe.
@@ -153,14 +167,17 @@ impl Clusters {
         distances.enumerate().fold((0, f64::INFINITY), |best, (i, d)| if d < best.1 { (i, d) } else { best }).0
     }
 
-    /// What a lobe over a normal adds to a texel, and to which cluster.
-    pub(crate) fn encode(&self, lobe: &Lobe, normal: Option<DVec3>, q: f64) -> (usize, [f64; MOMENTS]) {
+    /// What a lobe over a normal, with a factor on its colour, adds to a texel, and to which cluster.
+    pub(crate) fn encode(&self, lobe: &Lobe, normal: Option<DVec3>, colour: DVec3, q: f64) -> (usize, [f64; MOMENTS]) {
         let placed = Placed::of(lobe);
         let i = self.nearest(&placed);
         let mut moments = self.all.get(i).map_or([0.0; MOMENTS], |cluster| cluster.moments(&placed, q));
-        if let Some(normal) = normal.filter(|_| self.normals) {
+        if let Some(normal) = normal.filter(|_| self.layout.normals) {
             let at = q * stereographic::of(normal);
             (moments[6], moments[7]) = (at.x, at.y);
+        }
+        if self.layout.colours {
+            moments[8..].copy_from_slice(&(q * colour).to_array());
         }
         (i, moments)
     }
@@ -173,9 +190,10 @@ impl Clusters {
             let lobe = cluster.decode(*moments);
             let round = Lobe { weight: moments[0] / mass, ..lobe.round };
             let below = stereographic::direction(DVec2::new(moments[6], moments[7]) / moments[0]);
-            let normal = if self.normals { below } else { round.mu };
+            let normal = if self.layout.normals { below } else { round.mu };
+            let colour = self.layout.colours.then(|| DVec3::from_slice(&moments[8..]) / moments[0]);
             let (lobe, own) = (elliptic::Lobe { round, ..lobe }, 1.0 / cluster.own.max(1e-30));
-            (round.weight > LEAST_SHARE).then_some(Decoded { lobe, normal, own })
+            (round.weight > LEAST_SHARE).then_some(Decoded { lobe, normal, own, colour })
         };
         (self.all.iter().zip(all()).filter_map(lobe).collect(), mass)
     }
@@ -184,9 +202,21 @@ impl Clusters {
 /// Less of a texel's mass is none: that is what 16 bits round to.
 const LEAST_SHARE: f64 = 1e-6;
 
-/// Layers of four numbers: mass, x, y, xx of each cluster, then xy, yy of two clusters in a layer, or of each with its normal.
-pub(crate) fn layers(clusters: usize, normals: bool) -> usize {
-    clusters + if normals { clusters } else { clusters.div_ceil(2) }
+impl Layout {
+    /// The most clusters.
+    pub(crate) fn most(self) -> usize {
+        match self {
+            Self { colours: true, .. } => MOST_WITH_COLOURS,
+            Self { normals: true, .. } => MOST_WITH_NORMALS,
+            _ => MOST_CLUSTERS,
+        }
+    }
+
+    /// Layers of four numbers: mass, x, y, xx of each cluster; then xy, yy of two clusters in a layer, or of each with its normal; then
+    /// the colour of each.
+    pub(crate) fn layers(self, clusters: usize) -> usize {
+        clusters + if self.normals { clusters } else { clusters.div_ceil(2) } + if self.colours { clusters } else { 0 }
+    }
 }
 
 #[cfg(test)]
@@ -195,14 +225,14 @@ mod tests {
 
     #[test]
     fn a_lobe_is_decoded_as_itself() {
-        let clusters = Clusters::new(Vec::new(), false);
+        let clusters = Clusters::new(Vec::new(), Layout::default());
         for (mu, kappa) in [(DVec3::Z, 3e4), (DVec3::new(0.7, -0.5, 0.4), 12.0), (DVec3::new(-0.9, 0.1, -0.2), 300.0)] {
             let lobe = Lobe { mu: mu.normalize(), kappa, weight: 1.0 };
-            let (i, moments) = clusters.encode(&lobe, None, 1.3);
+            let (i, moments) = clusters.encode(&lobe, None, DVec3::ONE, 1.3);
             let (lobes, mass) = clusters.decode(&moments);
             assert!(i == 0 && lobes.len() == 1 && (mass - 1.3).abs() < 1e-12);
-            let Decoded { lobe: found, normal, .. } = lobes[0];
-            assert!(normal == found.round.mu);
+            let Decoded { lobe: found, normal, colour, .. } = lobes[0];
+            assert!(normal == found.round.mu && colour.is_none());
             assert!((found.round.mu - lobe.mu).length() < 1e-12 && (found.round.kappa / kappa - 1.0).abs() < 1e-6, "{found:?}");
             assert!((found.ratio - 1.0).abs() < 1e-6 && (found.round.weight - 1.0).abs() < 1e-12);
         }
@@ -218,24 +248,27 @@ mod tests {
             own: 0.0,
             bound,
         };
-        let clusters = Clusters::new(vec![at(-0.5, 0.01), at(0.5, 0.01), at(0.0, -0.01)], true);
+        let clusters =
+            Clusters::new(vec![at(-0.5, 0.01), at(0.5, 0.01), at(0.0, -0.01)], Layout { normals: true, colours: true });
         let lobe = |x: f64, kappa| Lobe { mu: DVec3::new(x, 0.0, 1.0).normalize(), kappa, weight: 1.0 };
-        let of = |x, kappa| clusters.encode(&lobe(x, kappa), None, 1.0).0;
+        let of = |x, kappa| clusters.encode(&lobe(x, kappa), None, DVec3::ONE, 1.0).0;
         assert_eq!([of(-0.1, 50.0), of(0.1, 50.0), of(0.9, 200.0)], [0, 1, 2]);
-        assert_eq!(clusters.bytes(), (3 + 3) * 8);
+        assert_eq!(clusters.bytes(), (3 + 3 + 3) * 8);
         let below = DVec3::new(0.3, -0.2, 0.9).normalize();
         let mut texel = [0.0; 3 * MOMENTS];
-        texel[..MOMENTS].copy_from_slice(&clusters.encode(&lobe(-0.1, 50.0), Some(below), 2.0).1);
-        assert!((clusters.decode(&texel).0[0].normal - below).length() < 1e-12);
+        let gold = DVec3::new(0.9, 0.6, 0.2);
+        texel[..MOMENTS].copy_from_slice(&clusters.encode(&lobe(-0.1, 50.0), Some(below), gold, 2.0).1);
+        let found = &clusters.decode(&texel).0[0];
+        assert!((found.normal - below).length() < 1e-12 && (found.colour.unwrap() - gold).length() < 1e-12, "{found:?}");
     }
 
     #[test]
     fn two_lobes_make_an_ellipse() {
-        let clusters = Clusters::new(Vec::new(), false);
+        let clusters = Clusters::new(Vec::new(), Layout::default());
         let mut texel = [0.0; MOMENTS];
         for x in [-0.1, 0.1] {
             let lobe = Lobe { mu: DVec3::new(0.6 * x, 0.8 * x, 1.0).normalize(), kappa: 1e4, weight: 0.5 };
-            texel.iter_mut().zip(clusters.encode(&lobe, None, 0.5).1).for_each(|(sum, m)| *sum += m);
+            texel.iter_mut().zip(clusters.encode(&lobe, None, DVec3::ONE, 0.5).1).for_each(|(sum, m)| *sum += m);
         }
         let (lobes, _) = clusters.decode(&texel);
         assert!(lobes[0].lobe.axis.dot(DVec3::new(0.6, 0.8, 0.0)).abs() > 0.999_999, "{lobes:?}");

@@ -69,7 +69,7 @@ impl<'a> Filtered<'a> {
     /// number of cells). `None` for a filter that stores nothing.
     pub fn new(filter: Filter, map: &'a BrdfMap, rule: Rule) -> Option<Self> {
         let known = match filter.has_clusters() {
-            true => Known::Clusters(Clusters::of(map.size(), map.normal(0).is_some(), &|i| map.texel(i).to_vec())),
+            true => Known::Clusters(Clusters::of(map.size(), map.normal(0).is_some(), &|i| map.texel(i).to_vec(), None)),
             false => Known::Nothing,
         };
         Self::over(filter, Cow::Borrowed(map), rule, known, |kappa| vmf::mean_cosine(kappa).max(LEAST_PROJECTED_AREA))
@@ -103,7 +103,7 @@ impl<'a> Filtered<'a> {
         let (slots, stride) = storage.layout(map.lobes_per_texel());
         let channels = if let Kept::Clusters(clusters) = &kept { clusters.all().len() * MOMENTS } else { slots * stride };
         let mips = Mips::new(map.size(), channels, |i, out| match &kept {
-            Kept::Clusters(clusters) => encode_clusters(clusters, map.texel(i), map.normal(i), area, out),
+            Kept::Clusters(clusters) => encode_clusters(clusters, &map, i, area, out),
             _ => encode(storage, map.texel(i), map.normal(i), rule, out),
         });
         let division = if rule.is_literal() { Division::PRINTED } else { Division::default() };
@@ -140,7 +140,7 @@ impl<'a> Filtered<'a> {
             Kept::Peaks(_) => return self.below(0, i),
             Kept::Clusters(clusters) => {
                 let mut out = vec![0.0; clusters.all().len() * MOMENTS];
-                encode_clusters(clusters, lobes, self.map.normal(i), self.area, &mut out);
+                encode_clusters(clusters, &self.map, i, self.area, &mut out);
                 return (!lobes.is_empty()).then_some(out);
             }
             Kept::Nothing => {}
@@ -220,6 +220,11 @@ impl<'a> Filtered<'a> {
     /// normals; none where lobes do not say it.
     pub fn own_concentrations(&self, texel: &[f64]) -> Vec<f64> {
         self.elliptic(texel).map_or_else(Vec::new, |found| found.0.iter().map(|l| l.own).collect())
+    }
+
+    /// The factors on the specular colour of each of the lobes of [`Self::decode`]; none where they share that of their place.
+    pub fn colours(&self, texel: &[f64]) -> Vec<DVec3> {
+        self.elliptic(texel).map_or_else(Vec::new, |found| found.0.iter().filter_map(|l| l.colour).collect())
     }
 
     /// Those of the map, if the filter has some.
@@ -354,10 +359,11 @@ impl<'a> Filtered<'a> {
     }
 }
 
-fn encode_clusters(clusters: &Clusters, lobes: &[Lobe], normal: Option<DVec3>, area: Area, out: &mut [f64]) {
+fn encode_clusters(clusters: &Clusters, map: &BrdfMap, texel: usize, area: Area, out: &mut [f64]) {
     out.fill(0.0);
-    for lobe in lobes {
-        let (i, moments) = clusters.encode(lobe, normal, lobe.weight / area(lobe.kappa));
+    let (normal, colour) = (map.normal(texel), map.colour(texel).unwrap_or(DVec3::ONE));
+    for lobe in map.texel(texel) {
+        let (i, moments) = clusters.encode(lobe, normal, colour, lobe.weight / area(lobe.kappa));
         out[i * MOMENTS..].iter_mut().zip(moments).for_each(|(sum, m)| *sum += m);
     }
 }

@@ -210,7 +210,7 @@ impl Gaussians {
             let mu = stereographic::direction(at);
             let round = Lobe { mu, kappa: stereographic::scale(at).powi(2) / variance, weight: m[0] / mass };
             let normal = if self.normals { stereographic::direction(DVec2::new(m[4], m[5]) / m[0]) } else { mu };
-            Decoded { lobe: elliptic::Lobe::from(round), normal, own: 1.0 / self.frame.own.max(1e-30) }
+            Decoded { lobe: elliptic::Lobe::from(round), normal, own: 1.0 / self.frame.own.max(1e-30), colour: None }
         };
         (self.there(texel).map(lobe).collect(), mass)
     }

@@ -9,7 +9,7 @@ pub mod alignment;
 pub(crate) mod below;
 pub mod brdf_map;
 pub mod chart;
-mod cluster_search;
+pub(crate) mod cluster_search;
 mod clustering;
 pub mod clusters;
 pub mod effective;

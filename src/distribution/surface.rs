@@ -34,6 +34,8 @@ pub struct FoundLobes {
     /// The concentrations of the lobes below each, beside which the rest of its width is the spread of their normals: towards a half
     /// vector the normal is that of the places whose lobes are there. None where normals stay the mean ones.
     pub own: Vec<f64>,
+    /// The factor on the specular colour of each; none where they share that of the place.
+    pub colours: Vec<DVec3>,
     /// The mean cosine of the directions of a place's lobes to its normal.
     pub facing: f64,
     /// How they are masked, if they are slopes.
@@ -70,6 +72,8 @@ struct Facet {
     normal: DVec3,
     /// How far the normals follow the half vector along the axis and across, of 1.
     follows: [f64; 2],
+    /// Its specular colour over that of the place.
+    colour: DVec3,
 }
 
 impl Facet {
@@ -103,7 +107,8 @@ pub struct Surface {
 }
 
 impl Surface {
-    /// `model` with `found`. `specular` and `base` are a factor on, and the albedo under, vMF lobes.
+    /// `model` with `found`. `specular` is the factor on specular colours there, which is in the model's already but for vMF lobes, `base`
+    /// the albedo under these.
     pub fn new(model: Model, found: &FoundLobes, specular: DVec3, base: DVec3) -> Self {
         let frame = effective::about(found.normal).transpose();
         let area = |kappa| mean_cosine(&model, kappa);
@@ -115,7 +120,10 @@ impl Surface {
                 [l.round.kappa / l.ratio, l.round.kappa * l.ratio].map(|kappa| (1.0 - kappa / own).max(0.0))
             });
             let round = Lobe { mu: frame * l.round.mu, weight, ..l.round };
-            Facet { lobe: elliptic::Lobe { round, axis: frame * l.axis, ..l }, normal, follows }
+            let part = |own: f64, all: f64| if all > 0.0 { own / all } else { 1.0 };
+            let over = |own: &DVec3| DVec3::from_array([0, 1, 2].map(|c| part(own[c], specular[c])));
+            let colour = found.colours.get(i).map_or(DVec3::ONE, over);
+            Facet { lobe: elliptic::Lobe { round, axis: frame * l.axis, ..l }, normal, follows, colour }
         };
         let (facets, slopes) = match &found.lobes {
             Mixture::Vmf(lobes) => (lobes.iter().map(|l| (*l).into()).enumerate().map(turned).collect(), None),
@@ -134,14 +142,9 @@ impl Surface {
         Self { model, facets, slopes, masking: found.masking, specular, base }
     }
 
-    /// Fresnel reflectance, and the base below it.
-    fn colours(&self, cosine: f64) -> (DVec3, DVec3) {
-        if matches!(self.model, Model::Ggx(_)) {
-            let fresnel = ggx::schlick(self.specular, cosine);
-            (fresnel, self.base * (DVec3::ONE - fresnel))
-        } else {
-            (self.specular, self.base)
-        }
+    /// Fresnel reflectance of a specular colour.
+    fn fresnel(&self, specular: DVec3, cosine: f64) -> DVec3 {
+        if matches!(self.model, Model::Ggx(_)) { ggx::schlick(specular, cosine) } else { specular }
     }
 
     /// `D G / (4 cos cos)` of a facet whose normal has the cosines `ci`, `co` and `ch` to light, viewer and half vector; `square` is the
@@ -175,13 +178,14 @@ impl Reflectance for Surface {
         }
         let h = (wi + wo).normalize();
         let across = wo.dot(h);
-        let (fresnel, below) = self.colours(across);
+        let fresnel = self.fresnel(self.specular, across);
+        let below = if matches!(self.model, Model::Ggx(_)) { self.base * (DVec3::ONE - fresnel) } else { self.base };
         let (specular, lit) = if let Some(slopes) = &self.slopes {
             let lit = |b: DVec2| (-b).extend(1.0).normalize().dot(wi).max(0.0);
             let lit = if let Mixture::Slopes(lobes) = slopes { lobes.iter().map(|l| l.weight * lit(l.mean)).sum() } else { 0.0 };
-            (slopes.specular(wi, wo, self.masking), lit / wi.z)
+            (fresnel * slopes.specular(wi, wo, self.masking), lit / wi.z)
         } else {
-            let (mut specular, mut lit, mut weights) = (0.0, 0.0, 0.0);
+            let (mut specular, mut lit, mut weights) = (DVec3::ZERO, 0.0, 0.0);
             for facet in &self.facets {
                 let Facet { lobe, normal: mean, .. } = facet;
                 let (round, normal) = (&lobe.round, facet.normal_at(h));
@@ -193,11 +197,12 @@ impl Reflectance for Surface {
                 }
                 let cosines = [ci, normal.dot(wo).max(FACING), normal.dot(h)];
                 let square = (h - round.mu).length_squared();
-                specular += round.weight * ci * self.facet(round.kappa, lobe.factor(h), cosines, square, across);
+                let value = self.facet(round.kappa, lobe.factor(h), cosines, square, across);
+                specular += self.fresnel(self.specular * facet.colour, across) * (round.weight * ci * value);
             }
             (specular / wi.z, lit / wi.z / f64::max(weights, f64::MIN_POSITIVE))
         };
-        fresnel * specular + below * (lit / PI)
+        specular + below * (lit / PI)
     }
 
     fn isotropic(&self) -> bool {

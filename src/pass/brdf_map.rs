@@ -2,10 +2,11 @@
 //! [`crate::moments`] is the f64 twin). Once a set of materials.
 
 use crate::config::Config;
+use crate::distribution::clusters::Layout;
 use crate::distribution::expectation::GAUSSIANS;
 use crate::distribution::filter::Storage;
 use crate::distribution::literal::SPREADS;
-use crate::distribution::{Cells, Filter, MOST_BASE_LOBES, clusters, vmf};
+use crate::distribution::{Cells, Filter, MOST_BASE_LOBES, vmf};
 use crate::error::Result;
 use crate::gpu::access::Access;
 use crate::gpu::buffer::Buffer;
@@ -17,6 +18,7 @@ use crate::gpu::retire::{Build, Handle, Retired};
 use crate::gpu::sampler::Samplers;
 use crate::moments::{Base, Parameter};
 use crate::pass::PassContext;
+use crate::pass::kept::Own;
 use crate::pass::maps::MapImages;
 use crate::reflectance::Lobe;
 use crate::texture::halved;
@@ -33,7 +35,7 @@ pub const INTERFACE: Interface = Interface {
     push_bytes: size_of::<Push>() as u32,
     gbuffer: false,
     materials: false,
-    own: &[D::COMBINED_IMAGE_SAMPLER, D::COMBINED_IMAGE_SAMPLER, D::STORAGE_IMAGE, D::STORAGE_BUFFER],
+    own: &[D::COMBINED_IMAGE_SAMPLER, D::COMBINED_IMAGE_SAMPLER, D::COMBINED_IMAGE_SAMPLER, D::STORAGE_IMAGE, D::STORAGE_BUFFER],
 };
 
 /// Sizes that the moments of one set of materials may have: beyond them the smallest take a larger one.
@@ -51,6 +53,7 @@ struct Push {
     layer: i32,
     normal_layer: i32,
     roughness_layer: i32,
+    colour_layer: i32,
     rule: f32,
     most: f32,
     upright: u32,
@@ -79,12 +82,14 @@ pub(crate) type Place = (usize, usize);
 pub(crate) struct Source {
     pub normal: Option<Place>,
     pub roughness: Option<Place>,
+    /// Of specular colours, where clusters keep these.
+    pub colours: Option<Place>,
     /// Of the roughness map, as `filter` has it.
     pub rule: [f32; 2],
     pub base: Base,
     pub parameter: Parameter,
-    /// The first of its clusters in the table, and how many there are.
-    pub clusters: [u32; 2],
+    /// In the table.
+    pub clusters: Own,
 }
 
 /// How many layers a source takes: of moments, and of cells.
@@ -96,7 +101,7 @@ pub(crate) struct Layers {
 
 impl Layers {
     /// As `glsl/include/moments.glsl` says.
-    pub fn of(filter: Filter, base: &Base, clusters: u32) -> Self {
+    pub fn of(filter: Filter, base: &Base, clusters: Own) -> Self {
         let count = base.lobes().len();
         let (merged, each, cells) = match filter.storage() {
             None | Some(Storage::Cells(Cells::One)) => (true, 1, 0),
@@ -106,7 +111,10 @@ impl Layers {
             Some(Storage::Clusters | Storage::Peaks(_) | Storage::Base | Storage::Gaussians(_)) => (false, 1, 0),
         };
         let cells = match filter.storage() {
-            Some(Storage::Clusters) => clusters::layers(clusters as usize, !base.upright()),
+            Some(Storage::Clusters) => {
+                let layout = Layout { normals: !base.upright(), colours: clusters.coloured };
+                layout.layers(clusters.count as usize)
+            }
             // With normals in layers behind all.
             Some(Storage::Peaks(peaks)) => peaks * if base.upright() { 1 } else { 2 },
             Some(Storage::Gaussians(_)) => GAUSSIANS * if base.upright() { 1 } else { 2 },
@@ -114,7 +122,8 @@ impl Layers {
             _ => cells + cells / 4 + if base.upright() { 0 } else { cells },
         };
         let lobes = if merged { count.min(1) } else { count };
-        Self { moments: usize::from(!base.upright()) + each * lobes, cells: if count > 0 { cells } else { 0 } }
+        let beside = usize::from(!base.upright()) + usize::from(clusters.coloured);
+        Self { moments: beside + each * lobes, cells: if count > 0 { cells } else { 0 } }
     }
 }
 
@@ -264,8 +273,8 @@ impl BrdfMap {
             let views = classes[class].level_views(build)?;
             for (source, layers) in &group.sources {
                 let read = |place: Option<Place>| Resource::Sampled(classes[place.map_or(0, |p| p.0)], samplers.nearest);
-                let [normal, roughness] = [source.normal, source.roughness].map(read);
-                let resources = [normal, roughness, Resource::Storage(views[0]), Resource::Buffer(&spreads)];
+                let [normal, roughness, colours] = [source.normal, source.roughness, source.colours].map(read);
+                let resources = [normal, roughness, colours, Resource::Storage(views[0]), Resource::Buffer(&spreads)];
                 write_set(&build.cx.device, sets.sets[pushes.len()], &resources);
                 pushes.push((class, Push::of(source, layers)));
             }
@@ -307,6 +316,7 @@ impl Push {
             layer: layers.moments as i32,
             normal_layer: of(source.normal),
             roughness_layer: of(source.roughness),
+            colour_layer: of(source.colours),
             rule: source.rule[0],
             most: source.rule[1],
             upright: u32::from(source.base.upright()),

@@ -51,6 +51,7 @@ struct Push {
     first: u32,
     all: u32,
     upright: u32,
+    coloured: u32,
 }
 
 /// Mirrors `Cluster` in `glsl/include/clusters.glsl`.
@@ -116,7 +117,7 @@ impl ClusterMoments {
         for (group, arrays) in groups.iter().zip(&moments.arrays).filter(|(group, _)| group.layers.cells > 0) {
             let class = arrays.moments.0;
             let Some(image) = classes.get(class + 1) else { continue };
-            let pushes = group.sources.iter().filter(|(source, _)| source.clusters[1] > 0).map(Push::of).collect();
+            let pushes = group.sources.iter().filter(|(source, _)| source.clusters.count > 0).map(Push::of).collect();
             works.push(GroupWork { classes: [class, class + 1], views: image.level_views(build)?, pushes });
             lobes.push(arrays.moments.1[0]);
         }
@@ -180,9 +181,10 @@ impl Push {
             lobe_layer: (layers.moments + usize::from(!source.base.upright())) as i32,
             cell_layer: layers.cells as i32,
             kind: brdf_map::lobes(!base.is_empty(), source.parameter),
-            first: source.clusters[0],
-            all: source.clusters[1],
+            first: source.clusters.first,
+            all: source.clusters.count,
             upright: u32::from(source.base.upright()),
+            coloured: u32::from(source.clusters.coloured),
         }
     }
 }

@@ -64,8 +64,8 @@ pub(crate) struct Io<'a> {
 pub(crate) struct Filter(ComputePipeline);
 
 impl Filter {
-    /// `clusters` is the most that a material has, at least 1.
-    pub fn new(p: &mut PassContext<'_, '_>, config: &Config, uses: Uses, clusters: u32) -> Result<Self> {
+    /// `clusters` is the most that a material has, at least 1, and whether those of some keep colours.
+    pub fn new(p: &mut PassContext<'_, '_>, config: &Config, uses: Uses, clusters: (u32, bool)) -> Result<Self> {
         let [albedo, specular, normal, roughness, moments, cells] = uses;
         let (geometric, filter) = (u32::from(config.widened()), config.filter);
         let lengths = match config.division {
@@ -74,7 +74,7 @@ impl Filter {
         };
         let [one, quarters] = lengths.map(f32::to_bits);
         let read = [config.anisotropy, config.lod_bias.to_bits(), u32::from(config.effective_rule().is_literal()), one, quarters];
-        let read = read.into_iter().chain([u32::from(config.bins == Bins::Camera), clusters]);
+        let read = read.into_iter().chain([u32::from(config.bins == Bins::Camera), clusters.0, u32::from(clusters.1)]);
         let lobes = [brdf_map::number(filter), filter.lobe_layers()].into_iter().chain(read);
         let constants = [albedo, specular, normal, roughness, geometric, moments, cells];
         let constants: Vec<_> = constants.into_iter().chain(lobes).collect();

@@ -9,7 +9,7 @@ use crate::gpu::upload::ImageUpload;
 use crate::material::Material;
 use crate::moments::{Base, Parameter};
 use crate::pass::brdf_map::{self, Group, Layers, Source};
-use crate::pass::kept::{self, Mixtures};
+use crate::pass::kept::{self, Mixtures, Own};
 use crate::pass::map_record::rule;
 use crate::pass::maps::Reading;
 use crate::pass::mixtures;
@@ -29,17 +29,18 @@ pub(crate) fn groups(
     bases: &[Option<Base>],
     sizes: Vec<[u32; 2]>,
     slots: &[Slots],
-    clusters: &[[u32; 2]],
+    clusters: &[Own],
     reading: &Reading<'_>,
 ) -> (Vec<Group>, Vec<Option<GroupPlace>>) {
     let mut groups: Vec<_> = sizes.into_iter().map(Group::new).collect();
     let mut place = |i: usize| {
-        let (material, base, slots, clusters) = (materials.get(i)?, (*bases.get(i)?)?, slots.get(i)?, clusters.get(i)?);
+        let (material, base, slots, clusters) = (materials.get(i)?, (*bases.get(i)?)?, slots.get(i)?, *clusters.get(i)?);
         let group = brdf_map::fitting(&groups, base.size(material))?;
         let roughness = base.roughness(material).and(slots.roughness);
         let parameter = Parameter::of(&material.model);
-        let source = Source { normal: slots.normal, roughness, rule: rule(material), base, parameter, clusters: *clusters };
-        let layers = Layers::of(reading.filter, &base, clusters[1]);
+        let colours = slots.specular.filter(|_| clusters.coloured);
+        let source = Source { normal: slots.normal, roughness, colours, rule: rule(material), base, parameter, clusters };
+        let layers = Layers::of(reading.filter, &base, clusters);
         let cells = if reading.bins == Bins::Camera { 0 } else { layers.cells };
         Some(GroupPlace { group, first: groups.get_mut(group)?.place(source, Layers { cells, ..layers }), layers })
     };

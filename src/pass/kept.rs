@@ -19,8 +19,17 @@ use std::sync::Arc;
 /// The clusters of all materials.
 pub(crate) struct Table {
     pub records: Vec<Record>,
-    /// Of each material the first of its own, and how many there are.
-    pub of: Vec<[u32; 2]>,
+    /// Of each material.
+    pub of: Vec<Own>,
+}
+
+/// The clusters of a material.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Own {
+    pub first: u32,
+    pub count: u32,
+    /// Whether texels keep colours by them.
+    pub coloured: bool,
 }
 
 impl Table {
@@ -28,11 +37,14 @@ impl Table {
     pub fn of(materials: &[Material], bases: &[Option<Base>], filter: Filter) -> Self {
         let mut table = Self { records: Vec::new(), of: Vec::new() };
         for (i, (material, base)) in materials.iter().zip(bases).enumerate() {
-            let known = (0..i).find(|k| bases.get(*k) == Some(base) && same_maps(&materials[*k], material));
+            let colours = |m: &Material| m.maps.specular.as_ref().map(Arc::as_ptr);
+            let same = |m: &Material| same_maps(m, material) && colours(m) == colours(material);
+            let known = (0..i).find(|k| bases.get(*k) == Some(base) && same(&materials[*k]));
             let own = match known.and_then(|k| table.of.get(k)) {
                 Some(own) => *own,
                 None => {
-                    base.as_ref().and_then(|base| moments::clusters(material, base, filter)).map_or([0; 2], |c| table.push(&c))
+                    let own = base.as_ref().and_then(|base| moments::clusters(material, base, filter));
+                    own.map_or(Own::default(), |clusters| table.push(&clusters))
                 }
             };
             table.of.push(own);
@@ -44,15 +56,20 @@ impl Table {
         table
     }
 
-    fn push(&mut self, clusters: &Clusters) -> [u32; 2] {
-        let first = self.records.len();
+    fn push(&mut self, clusters: &Clusters) -> Own {
+        let first = self.records.len() as u32;
         self.records.extend(clusters.all().iter().map(Record::from));
-        [first as u32, clusters.all().len() as u32]
+        Own { first, count: clusters.all().len() as u32, coloured: clusters.layout().colours }
     }
 
     /// The most that a material has, at least 1.
     pub fn most(&self) -> u32 {
-        self.of.iter().map(|own| own[1]).fold(1, u32::max)
+        self.of.iter().map(|own| own.count).fold(1, u32::max)
+    }
+
+    /// Whether a material's keep colours.
+    pub fn coloured(&self) -> bool {
+        self.of.iter().any(|own| own.coloured)
     }
 }
 

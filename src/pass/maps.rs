@@ -98,6 +98,8 @@ pub(crate) struct MapsUpload {
     pub uses: Uses,
     /// The most clusters that a material has, at least 1.
     pub most_clusters: u32,
+    /// Whether clusters of some keep colours.
+    pub coloured: bool,
     pub work: Option<MomentWork>,
 }
 
@@ -223,7 +225,7 @@ impl MapsUpload {
             .of
             .iter()
             .zip(&known)
-            .map(|([first, count], known)| known.as_ref().map_or([*first, *count, 0, 0], Mixtures::shared));
+            .map(|(own, known)| known.as_ref().map_or([own.first, own.count, u32::from(own.coloured), 0], Mixtures::shared));
         for ((((material, slots), base), place), shared) in materials.iter().zip(slots).zip(bases).zip(&places).zip(shared) {
             let (moments, cells) = (place.map(|p| p.moments.0), place.and_then(|p| p.cells.map(|c| c.0)));
             let mut slots = [slots.albedo, slots.specular, slots.normal, slots.roughness, moments, cells];
@@ -263,8 +265,8 @@ impl MapsUpload {
             None => None,
         };
         let records = BufferUpload::new(build, "maps", usage, bytemuck::cast_slice(&records))?;
-        let most_clusters = table.most();
-        Ok(Self { records, clusters, classes, moments, places, divided, found, uses, most_clusters, work })
+        let (most_clusters, coloured) = (table.most(), table.coloured());
+        Ok(Self { records, clusters, classes, moments, places, divided, found, uses, most_clusters, coloured, work })
     }
 
     pub fn record(self, rec: &mut Recorder<'_>, bag: &mut Retired) -> MapImages {

@@ -111,11 +111,11 @@ pub(crate) fn lobe_constants(config: &Config, kinds: Kinds) -> [u32; 8] {
     let layers = config.filter.lobe_layers();
     let slopes = config.filter.has_slopes();
     let smith = config.filter == Filter::Leadr;
-    let elliptic = config.filter.is_elliptic();
+    let elliptic = u32::from(config.filter.is_elliptic()) + u32::from(kinds.coloured);
     let of_kinds = [kinds.unfiltered, kinds.fitted, kinds.reflected].map(u32::from);
     let of_filter = [layers > 0, slopes, smith].map(u32::from);
     let ([lobed, slopes, smith], [unfiltered, fitted, reflected]) = (of_filter, of_kinds);
-    [layers.max(1), lobed, slopes, smith, unfiltered, u32::from(elliptic), fitted, reflected]
+    [layers.max(1), lobed, slopes, smith, unfiltered, elliptic, fitted, reflected]
 }
 
 /// What is added on both sides of a factor on light that is looked up, so that factors stay small where there is little of it beside

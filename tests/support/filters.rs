@@ -29,6 +29,16 @@ pub fn roughness(size: [u32; 2], kind: Roughness, low: f32, high: f32) -> Option
     Some((Arc::new(Texture::scalar(size, &texels(size, texel)).unwrap()), kind))
 }
 
+/// Gold where [`roughness`] is high, dark where it is low.
+#[allow(dead_code, reason = "not all that use these have colours")]
+pub fn sheen(size: [u32; 2]) -> Option<Arc<Texture>> {
+    let texel = |u: f32, v: f32| {
+        let high = 0.5 + 0.5 * (TAU * (3.0 * u + 2.0 * v)).sin();
+        [0.1 + 0.8 * high, 0.1 + 0.5 * high, 0.15].map(|c| c.min(1.0))
+    };
+    Some(Arc::new(Texture::colour(size, &texels(size, texel)).unwrap()))
+}
+
 pub fn blinn_phong() -> Model {
     Model::BlinnPhong(BlinnPhong { exponent: 90.0, specular: DVec3::new(0.5, 0.6, 0.7), albedo: DVec3::splat(0.3) })
 }

@@ -49,6 +49,7 @@ impl Found {
             below: lobes.iter().map(|l| l.kappa).collect(),
             mass: None,
             own: Vec::new(),
+            colours: Vec::new(),
             facing: 1.0,
             masking: Masking::Cavities,
         };

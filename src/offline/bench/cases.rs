@@ -32,7 +32,8 @@ pub enum Gloss {
 pub struct Case {
     /// A mesh, by the name that its scene has here.
     pub mesh: &'static str,
-    /// A built-in (synthetic) reflectance; `mirror`, GGX of alpha 0.01; or `several`, those of the scene.
+    /// A built-in (synthetic) reflectance; `mirror`, GGX of alpha 0.01; `rgl-isotropic` or `rgl-anisotropic`, tables of random
+    /// numbers; or `several`, those of the scene.
     pub reflectance: &'static str,
     /// A built-in environment, or the stem of a fetched one.
     pub environment: &'static str,
@@ -53,8 +54,11 @@ const MESHES: [(&str, &str, &str, Option<[&str; 2]>); 7] = [
 ];
 /// Built-in environments that cases use; the others are fetched.
 const BUILTIN_ENVIRONMENTS: [&str; 2] = ["sun-sky", "studio"];
-/// Reflectances that are no tables, as scene files have them.
+/// Reflectances that are no built-in tables, as scene files have them.
 const MODELS: [(&str, &str); 1] = [("mirror", "{ ggx = { alpha = 0.01, f0 = [0.95, 0.85, 0.6], albedo = 0 } }")];
+/// Tables in RGL's format, of random numbers, isotropic and not; by their path from the repository's root.
+const RGL: [(&str, &str); 2] =
+    [("rgl-isotropic", "tests/data/rgl/isotropic.bsdf"), ("rgl-anisotropic", "tests/data/rgl/whole.bsdf")];
 /// In the place of a reflectance, where a scene has several and keeps them.
 const SEVERAL: &str = "several";
 /// Where `scripts/fetch-assets` puts files, from the repository's root.
@@ -103,7 +107,7 @@ pub const RESIDUAL_TUNING: [Case; 2] = [quick("torus-knot", "mirror-metal", "stu
 
 /// Of the suite residual, those on which they are judged: of the meshes and reflectances of each half above, and with what is hard for
 /// lobes that stand for a reflectance, which is a mirror, noise, and several materials in a frame.
-pub const RESIDUAL_JUDGED: [Case; 8] = [
+pub const RESIDUAL_JUDGED: [Case; 12] = [
     quick("sphere", "metallic-paint", "sun-sky"),
     quick("bumpy-sphere", "mirror-metal", "studio"),
     quick("torus-knot", "mirror", "sun-sky"),
@@ -112,6 +116,10 @@ pub const RESIDUAL_JUDGED: [Case; 8] = [
     case("bumpy-sphere", "mirror", "city"),
     case("bunny", "metallic-paint", "city"),
     case("armadillo", "rough", "sun-sky"),
+    case("torus-knot", "gloss-plastic", "forest"),
+    case("bunny", "felt", "city"),
+    case("torus-knot", "rgl-isotropic", "sun-sky"),
+    case("bumpy-sphere", "rgl-anisotropic", "studio"),
 ];
 
 /// Every case of both halves, or those of the quick preset.
@@ -142,7 +150,7 @@ impl Case {
     pub fn gloss(&self) -> Gloss {
         match self.reflectance {
             "mirror-metal" | "mirror" => Gloss::Mirror,
-            "rough" | "satin" => Gloss::Rough,
+            "rough" | "satin" | "felt" => Gloss::Rough,
             _ => Gloss::Glossy,
         }
     }
@@ -167,14 +175,15 @@ impl Case {
         if !missing.is_empty() {
             return Ok(Err(missing));
         }
-        // A path in an override is relative to the scene file, unless it is absolute.
-        let map = std::path::absolute(&map).unwrap_or(map).to_string_lossy().into_owned();
+        // A path in an override is relative to the scene file, unless it is absolute. As a TOML literal, for backslashes.
+        let literal = |path: PathBuf| format!("'{}'", std::path::absolute(&path).unwrap_or(path).to_string_lossy());
         let environment = match builtin {
             true => ("environment.builtin".to_string(), self.environment.to_string()),
-            // As a TOML literal, for backslashes.
-            false => ("environment.map".to_string(), format!("'{map}'")),
+            false => ("environment.map".to_string(), literal(map)),
         };
         let model = MODELS.iter().find(|(name, _)| *name == self.reflectance).map(|(_, model)| model.to_string());
+        let table = RGL.iter().find(|(name, _)| *name == self.reflectance);
+        let model = model.or_else(|| table.map(|(_, path)| format!("{{ rgl = {} }}", literal(root.join(path)))));
         let reflectance = match model {
             Some(model) => Some((format!("materials.{material}.reflectance"), model)),
             None if self.reflectance == SEVERAL => None,
