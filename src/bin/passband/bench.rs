@@ -56,7 +56,7 @@ pub struct Args {
     #[arg(long, value_name = "FOLDER")]
     plots: Option<PathBuf>,
     /// Write figures into this folder: of bagher those of Bagher et al. 2011 (6, 11, 12, 14 and 15), of residual what is looked up,
-    /// what that leaves and the result, both of each scene of the quick preset or named here; of xu and tan the truth beside every filter, of each scene
+    /// what that leaves and the result, of joined what filters and rates do, all of each scene of the quick preset or named here; of xu and tan the truth beside every filter, of each scene
     #[arg(long, value_name = "FOLDER")]
     figures: Option<PathBuf>,
     /// Write a page to look at
@@ -140,12 +140,14 @@ impl Args {
             Suite::Passes => suites::Suite::Passes,
             Suite::Bagher => suites::Suite::Bagher,
             Suite::Residual => suites::Suite::Residual,
-            Suite::Xu | Suite::Tan | Suite::Joined | Suite::Scaling | Suite::All => {
-                return Err(Error::NotSupportedYet { what: "--suite joined, scaling and all".into() });
+            Suite::Joined => suites::Suite::Joined,
+            Suite::Xu | Suite::Tan | Suite::Scaling | Suite::All => {
+                return Err(Error::NotSupportedYet { what: "--suite scaling and all".into() });
             }
         };
         let pictured = self.plots.is_some() || self.figures.is_some();
         later(pictured && suite == suites::Suite::Passes, "--plots and --figures of the suite passes")?;
+        later(self.plots.is_some() && suite == suites::Suite::Joined, "--plots of the suite joined")?;
         Ok(suites::Order {
             suite,
             preset: self.preset(),
@@ -155,7 +157,7 @@ impl Args {
             scenes: self.scenes.clone(),
             device: self.options(),
             root: PathBuf::new(),
-            cache: reference::cache_folder(),
+            cache: if suite == suites::Suite::Joined { xu::cache_folder() } else { reference::cache_folder() },
         })
     }
 

@@ -3,6 +3,7 @@
 use super::{aligned, bounded};
 use passband::offline::bench::cases::Half;
 use passband::offline::bench::environment::EnvironmentTimes;
+use passband::offline::bench::joined;
 use passband::offline::bench::reached::{Reached, Way};
 use passband::offline::bench::report::{Report, SceneReport};
 use passband::offline::bench::statistics::Ratio;
@@ -127,6 +128,22 @@ pub fn reached(lines: &[Reached]) -> String {
         "its relMSE",
         "base cost",
     ];
+    aligned(&header, 2, lines.iter().map(row))
+}
+
+/// Joined frames beside supersampling and each method alone.
+pub fn joined(lines: &[joined::Line]) -> String {
+    let over = |over: &joined::Over| {
+        let by = over.variant.clone().unwrap_or_default();
+        let [least, most] = over.interval;
+        [format!("{} [{least:.2}, {most:.2}]", bounded(over.speed_up.factor, over.speed_up.is)), by]
+    };
+    let row = |line: &joined::Line| {
+        let own = [format!("{:.1}", line.ms), format!("{:.2}", line.psnr), format!("{:.1e}", line.relmse)];
+        let start = [line.scene.clone(), line.variant.clone()].into_iter().chain(own);
+        start.chain(over(&line.supersampling)).chain(over(&line.alone)).collect()
+    };
+    let header = ["scene", "variant", "ms", "PSNR", "relMSE", "supersampling", "by", "alone", "by"];
     aligned(&header, 2, lines.iter().map(row))
 }
 

@@ -4,8 +4,10 @@ use crate::offline::bench::equal::{Rung, equal};
 use crate::offline::bench::quality::{self, Frame};
 use crate::offline::bench::reference::{self, Converged, Goal};
 use crate::offline::bench::report::{Against, ReferenceReport, Row};
+use crate::offline::bench::truths::Truths;
 use crate::offline::error::{Error, Result};
 use crate::offline::render::Settings;
+use crate::offline::supersample;
 use crate::offline::world::World;
 use std::path::Path;
 
@@ -15,6 +17,9 @@ const MARGIN: f64 = 12.0;
 const MOST_DIRECTIONS: u64 = 1 << 16;
 /// An [agreement](ReferenceReport::agreement) above this is no chance: what the cache held is of another renderer.
 const MOST_DISAGREEMENT: f64 = 1.4;
+/// The smallest error over the noise of a truth is to be this, and the sub-samples a pixel after which it is not refined further.
+const ENOUGH: f64 = 10.0;
+const MOST_SUB_SAMPLES: u64 = 4 * supersample::DEFAULT_SAMPLES as u64;
 /// Estimators whose full rate is a ladder.
 const LADDERS: [&str; 2] = ["mis", "brdf-random"];
 
@@ -58,7 +63,41 @@ pub fn judge(
         let noise = image.noise()?;
         let smallest = rows.iter().filter_map(|r| r.error.as_ref()).map(|e| e.rmse).fold(f64::INFINITY, f64::min);
         let margin = smallest / noise.rmse;
-        let report = ReferenceReport { directions: image.directions(), cached: image.cached, noise, margin, agreement };
+        let report =
+            ReferenceReport { directions: image.directions(), cached: image.cached, noise, margin, agreement: Some(agreement) };
+        return Ok((report, image));
+    }
+}
+
+/// Errors of all variants against the truth of filters, over what surfaces cover wholly.
+///
+/// # Errors
+/// The device's.
+pub fn judge_by_truth(
+    world: &World,
+    base: &Settings,
+    folder: Option<&Path>,
+    frames: &[Vec<Frame>],
+    rows: &mut [Row],
+    progress: &mut dyn FnMut(u64, u64),
+) -> Result<(ReferenceReport, Converged)> {
+    let mut truths = Truths::new(world, &base.device, folder, supersample::DEFAULT_SAMPLES / 2);
+    let first: u64 = supersample::DEFAULT_SAMPLES.into();
+    let mut goal = Goal { noise: 0.0, most: first };
+    loop {
+        let image = truths.of(&world.camera, base.config.extent, &goal, progress)?;
+        let (picture, mask) = (image.image().picture, image.whole());
+        for (row, frames) in rows.iter_mut().zip(frames) {
+            row.error = Some(quality::error(frames, &picture, &mask)?);
+        }
+        let noise = image.noise()?;
+        let smallest = rows.iter().filter_map(|r| r.error.as_ref()).map(|e| e.rmse).fold(f64::INFINITY, f64::min);
+        let margin = smallest / noise.rmse;
+        if margin < ENOUGH && image.directions() < MOST_SUB_SAMPLES {
+            goal = Goal { noise: smallest / ENOUGH, most: MOST_SUB_SAMPLES };
+            continue;
+        }
+        let report = ReferenceReport { directions: image.directions(), cached: image.cached, noise, margin, agreement: None };
         return Ok((report, image));
     }
 }

@@ -32,6 +32,29 @@ impl Frame {
     }
 }
 
+impl Frame {
+    /// The means over `side` x `side` pixels.
+    #[must_use]
+    pub fn averaged(self, side: u32) -> Self {
+        if side <= 1 {
+            return self;
+        }
+        let [width, height] = [self.picture.width, self.picture.height].map(|e| (e / side) as usize);
+        let side = side as usize;
+        let share = 1.0 / (side * side) as f64;
+        let mean = |i: usize, of: &dyn Fn(usize) -> f64| {
+            let (x, y) = (i % width * side, i / width * side);
+            let inside = (0..side * side).map(|k| (y + k / side) * width * side + x + k % side);
+            (inside.map(of).sum::<f64>() * share) as f32
+        };
+        let rgb = |i| [0, 1, 2].map(|c| mean(i, &|k| f64::from(self.picture.rgb[k][c])));
+        Self {
+            picture: Picture { width: width as u32, height: height as u32, rgb: (0..width * height).map(rgb).collect() },
+            coverage: (0..width * height).map(|i| mean(i, &|k| f64::from(self.coverage[k]))).collect(),
+        }
+    }
+}
+
 /// What of a converged image is noise, as the error that it would have against the truth.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Noise {
@@ -116,6 +139,15 @@ mod tests {
         let halved = error(&[frame(0.04)], &truth.picture, &mask).unwrap();
         assert!((found.relmse / halved.relmse - 1.0).abs() < 0.05, "{found:?} {halved:?}");
         assert!(error(&[], &truth.picture, &mask).is_err());
+    }
+
+    #[test]
+    fn finer_frames_are_averaged() {
+        let fine = frame(0.25);
+        let expected = frame(0.0).picture.rgb[0];
+        let coarse = fine.averaged(4);
+        assert_eq!((coarse.picture.width, coarse.picture.height, coarse.coverage.len()), (16, 16, 256));
+        assert!(coarse.picture.rgb.iter().all(|c| *c == expected) && coarse.coverage.iter().all(|c| *c == 1.0));
     }
 
     #[test]

@@ -34,6 +34,9 @@ pub fn cache_folder() -> Option<PathBuf> {
     cache::folder("reference")
 }
 
+/// A pixel is covered wholly from this share of it on.
+const WHOLE: f32 = 0.9999;
+
 /// When an image is good enough.
 #[derive(Clone, Copy, Debug)]
 pub struct Goal {
@@ -110,6 +113,11 @@ impl Converged {
     /// Covered pixels.
     pub fn mask(&self) -> Vec<bool> {
         self.image().coverage.iter().map(|a| *a > 0.0).collect()
+    }
+
+    /// Pixels that surfaces cover wholly: sums are rounded.
+    pub fn whole(&self) -> Vec<bool> {
+        self.image().coverage.iter().map(|a| *a >= WHOLE).collect()
     }
 
     /// The means of the halves.

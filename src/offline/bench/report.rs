@@ -5,6 +5,7 @@ use crate::offline::bench::cases::{Case, Half};
 use crate::offline::bench::curves::Curve;
 use crate::offline::bench::environment::EnvironmentTimes;
 use crate::offline::bench::equal::{Equal, Is};
+use crate::offline::bench::joined;
 use crate::offline::bench::quality::Noise;
 use crate::offline::bench::reached::Reached;
 use crate::offline::bench::runner::{Measured, Part};
@@ -58,6 +59,8 @@ pub struct Report {
     pub table: Vec<Line>,
     /// The suite residual: what is as good as full rate, and how much sooner.
     pub reached: Vec<Reached>,
+    /// The suite joined: what supersampling and each method alone take for as small an error.
+    pub joined: Vec<joined::Line>,
     /// What was aimed at.
     pub targets: Vec<Target>,
     /// Wall times of the run.
@@ -118,8 +121,8 @@ pub struct ReferenceReport {
     /// The smallest error that was judged by it, over its noise (root mean squares): 10 or more is good.
     pub margin: f64,
     /// Error of full rate at most directions against it, over what two frames of that say of each other: 1 unless the
-    /// reference is of something else.
-    pub agreement: f64,
+    /// reference is of something else. Absent for truths of filters, from which full rate differs by more than noise.
+    pub agreement: Option<f64>,
 }
 
 /// One variant in one scene.

@@ -80,6 +80,8 @@ pub struct Variant {
     pub part: Part,
     /// What is rendered; `aovs`, `reference` and `timed` are not looked at.
     pub settings: Settings,
+    /// Of an image with that many times the pixels a side of the others, means over as many are what is kept.
+    pub finer: u32,
 }
 
 /// A session and what its frames took.
@@ -91,6 +93,7 @@ struct Subject {
     /// The first round of which the image is kept.
     kept_from: u32,
     images: Vec<Frame>,
+    finer: u32,
 }
 
 impl Subject {
@@ -99,7 +102,7 @@ impl Subject {
         config.validate()?;
         let mut session = Session::new(Headless::new(&variant.settings.device, &Requirements::of(&config))?, world, &config)?;
         variant.settings.prepare(&mut session, world, &config)?;
-        Ok(Self { session, config, record_ms: Vec::new(), kept_from: u32::MAX, images: Vec::new() })
+        Ok(Self { session, config, record_ms: Vec::new(), kept_from: u32::MAX, images: Vec::new(), finer: variant.finer })
     }
 }
 
@@ -120,7 +123,7 @@ impl Timed for Subject {
         self.session.frame(kept.map_or(seed, |image| [1, image]))?;
         self.record_ms.push(self.session.record_ms());
         if kept.is_some() {
-            self.images.push(Frame::read(&mut self.session)?);
+            self.images.push(Frame::read(&mut self.session)?.averaged(self.finer));
         }
         Ok(())
     }
@@ -159,7 +162,7 @@ impl<'a> Runner<'a> {
     pub fn new(world: &'a World, mut variants: Vec<Variant>, progress: &mut dyn FnMut(u64, u64)) -> Result<Self> {
         if let Some(first) = variants.first() {
             let name = format!("control: {}", first.name);
-            variants.push(Variant { name, part: Part::Control, settings: first.settings.clone() });
+            variants.push(Variant { name, part: Part::Control, ..first.clone() });
         }
         let total = variants.len() as u64;
         let mut runner = Self { world, variants: Vec::new(), subjects: Vec::new(), times: Vec::new() };

@@ -8,7 +8,7 @@ use crate::offline::bench::reference::Converged;
 use crate::offline::bench::report::{Head, Report, Row, SceneReport, Seconds, Skipped, gains};
 use crate::offline::bench::runner::Runner;
 use crate::offline::bench::variants::{self, Family};
-use crate::offline::bench::{curves, judge, reached, table};
+use crate::offline::bench::{curves, joined, judge, reached, table};
 use crate::offline::error::Result;
 use crate::offline::headless::Options;
 use crate::offline::progress::Progress;
@@ -28,6 +28,8 @@ pub enum Suite {
     Bagher,
     /// Light that is looked up and its residual against full rate.
     Residual,
+    /// Filters, predicted rates and light that is looked up, alone and together, against supersampling.
+    Joined,
 }
 
 /// How much of it.
@@ -72,6 +74,7 @@ impl Suite {
             Self::Passes => "passes",
             Self::Bagher => "bagher",
             Self::Residual => "residual",
+            Self::Joined => "joined",
         }
     }
 
@@ -80,6 +83,7 @@ impl Suite {
             Self::Passes => variants::PASSES,
             Self::Bagher => variants::BAGHER,
             Self::Residual => variants::RESIDUAL,
+            Self::Joined => variants::JOINED,
         }
     }
 
@@ -88,8 +92,28 @@ impl Suite {
         match self {
             Self::Passes => 0,
             // Pairs of them give the noise of one.
-            Self::Bagher | Self::Residual => 2,
+            Self::Bagher | Self::Residual | Self::Joined => 2,
         }
+    }
+
+    /// The scenes' size, if these have none.
+    fn extent(self, preset: Preset) -> [u32; 2] {
+        match (self, preset) {
+            // As supersampling has 64 times the samples.
+            (Self::Joined, _) => preset.extent().map(|e| e / 2),
+            _ => preset.extent(),
+        }
+    }
+
+    /// The built-in scenes, if all are.
+    fn scenes(self, preset: Preset) -> Option<Vec<String>> {
+        let quick = preset == Preset::Quick;
+        let names: Vec<&str> = match self {
+            Self::Passes => PASSES_SCENES[..if quick { 1 } else { PASSES_SCENES.len() }].to_vec(),
+            Self::Joined => joined::SCENES.iter().filter(|(_, in_quick)| *in_quick || !quick).map(|(name, _)| *name).collect(),
+            Self::Bagher | Self::Residual => return None,
+        };
+        Some(names.into_iter().map(String::from).collect())
     }
 }
 
@@ -138,14 +162,12 @@ pub fn run(
         summary: Vec::new(),
         table: Vec::new(),
         reached: Vec::new(),
+        joined: Vec::new(),
         targets: Vec::new(),
         seconds: Seconds::default(),
     };
     let mut run = Run { order, clock: Instant::now(), report: &mut report, keep, progress, found, known: Vec::new() };
-    let default = matches!(order.suite, Suite::Passes).then(|| {
-        let count = if order.preset == Preset::Quick { 1 } else { PASSES_SCENES.len() };
-        PASSES_SCENES.iter().take(count).map(|name| name.to_string()).collect::<Vec<_>>()
-    });
+    let default = order.suite.scenes(order.preset);
     if let Some(names) = if order.scenes.is_empty() { default.as_ref() } else { Some(&order.scenes) } {
         // A name that is none is known before the work begins.
         let scenes: Vec<Scene> = names.iter().map(|name| Scene::load(name, &[])).collect::<Result<_>>()?;
@@ -184,7 +206,7 @@ impl Run<'_, '_, '_> {
         let mut world = scene.resolve()?;
         world.name = name.to_string();
         let order = self.order;
-        let extent = order.extent.or(world.size).unwrap_or(order.preset.extent());
+        let extent = order.extent.or(world.size).unwrap_or(order.suite.extent(order.preset));
         let base = Settings { device: order.device.clone(), ..Settings::new(scene.config(extent)) };
         let mut found = SceneReport {
             name: world.name.clone(),
@@ -217,6 +239,7 @@ impl Run<'_, '_, '_> {
                 let stage = figures::Stage { world: &world, base: &base, reference: &reference, found: &found };
                 match order.suite {
                     Suite::Residual => keep(name, stage.parts()?)?,
+                    Suite::Joined => keep(name, stage.together()?)?,
                     Suite::Passes | Suite::Bagher => stage.draw(&mut |figure| keep(name, figure))?,
                 }
             }
@@ -238,6 +261,10 @@ impl Run<'_, '_, '_> {
             Suite::Residual => {
                 report.reached = reached::lines(&report.scenes);
                 report.targets = reached::targets(&report.reached);
+            }
+            Suite::Joined => {
+                report.joined = joined::lines(&report.scenes);
+                report.targets = joined::targets(&report.joined);
             }
         }
         report.seconds.total = self.clock.elapsed().as_secs_f64();
@@ -280,9 +307,12 @@ impl Run<'_, '_, '_> {
         let progress = &mut *self.progress;
         let mut told = |done, total| progress(&what, done, total);
         let folder = self.order.cache.as_deref();
-        let (reference, image) = judge::judge(world, base, folder, frames, &mut found.variants, &mut told)?;
+        let judge = if self.order.suite == Suite::Joined { judge::judge_by_truth } else { judge::judge };
+        let (reference, image) = judge(world, base, folder, frames, &mut found.variants, &mut told)?;
         found.reference = Some(reference);
-        judge::compare(&mut found.variants);
+        if self.order.suite != Suite::Joined {
+            judge::compare(&mut found.variants);
+        }
         self.report.seconds.references += clock.elapsed().as_secs_f64();
         Ok(image)
     }

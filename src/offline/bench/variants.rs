@@ -2,7 +2,7 @@
 
 use crate::offline::bench::runner::{Part, Variant};
 use crate::offline::render::Settings;
-use crate::{Config, Estimator, Rate};
+use crate::{Config, Estimator, Filter, Rate};
 
 /// Some numbers of directions with the rest the same.
 pub struct Family {
@@ -11,6 +11,8 @@ pub struct Family {
     rate: Rate,
     oracle: bool,
     estimator: Estimator,
+    /// Samples a pixel's side that are averaged into one.
+    finer: u32,
     /// In the place of a default.
     change: fn(&mut Config),
     /// Of the quick preset.
@@ -26,11 +28,14 @@ const FULL: Family = Family {
     rate: Rate::Full,
     oracle: false,
     estimator: Estimator::Mis,
+    finer: 1,
     change: |_| (),
     directions: &[64],
     more: &[],
 };
 const HALF: Family = Family { name: "half", rate: Rate::Uniform(1), ..FULL };
+const QUARTER: Family = Family { name: "quarter", rate: Rate::Uniform(2), ..FULL };
+const LUMINANCE: Family = Family { name: "luminance", rate: Rate::Luminance, ..FULL };
 const BANDWIDTH: Family = Family { name: "bandwidth", rate: Rate::Bandwidth, ..FULL };
 
 /// What every pass costs, with and without levels. The first variant is the control's.
@@ -58,8 +63,8 @@ pub const BAGHER: &[Family] = &[
     Family { directions: &[64, 4, 16, 256], ..FULL },
     Family { name: "full brdf-random", estimator: Estimator::BrdfRandom, directions: &[64, 256], more: &[16, 512], ..FULL },
     compared(HALF),
-    compared(Family { name: "quarter", rate: Rate::Uniform(2), ..FULL }),
-    compared(Family { name: "luminance", rate: Rate::Luminance, ..FULL }),
+    compared(QUARTER),
+    compared(LUMINANCE),
     compared(BANDWIDTH),
     // Each is searched for anew.
     Family { name: "oracle", rate: Rate::Given, oracle: true, more: &[16, 256], ..FULL },
@@ -100,6 +105,53 @@ pub const RESIDUAL: &[Family] = &[
     further_residual("residual above .2", |c| c.residual_errors = [0.2, 0.2, 0.25]),
 ];
 
+/// Filters, predicted rates and light that is looked up, each alone and joined; and supersampling, by samples a pixel's side and
+/// directions of each.
+pub const JOINED: &[Family] = &[
+    point(FULL, "point full", &[64], &[16, 256]),
+    point(HALF, "point half", &[], &[64]),
+    point(QUARTER, "point quarter", &[], &[64]),
+    point(LUMINANCE, "point luminance", &[], &[64]),
+    point(BANDWIDTH, "point bandwidth", &[64], &[16, 256]),
+    point(Family { estimator: Estimator::Residual, ..BANDWIDTH }, "point residual", &[16], &[64]),
+    point(Family { estimator: Estimator::Preconvolved, ..FULL }, "point base", &[1], &[]),
+    vmf8(FULL, "vmf8 full", &[], &[16, 64, 256]),
+    vmf8(BANDWIDTH, "vmf8 bandwidth", &[], &[64]),
+    vmf8(Family { estimator: Estimator::Residual, ..BANDWIDTH }, "vmf8 residual", &[], &[64]),
+    vmf8(Family { estimator: Estimator::Preconvolved, ..FULL }, "vmf8 base", &[], &[1]),
+    clusters(FULL, "clusters full", &[64], &[16, 256]),
+    clusters(HALF, "clusters half", &[], &[64]),
+    clusters(QUARTER, "clusters quarter", &[], &[64]),
+    clusters(LUMINANCE, "clusters luminance", &[], &[64]),
+    clusters(Family { rate: Rate::Given, oracle: true, ..FULL }, "clusters oracle", &[], &[64]),
+    clusters(BANDWIDTH, "clusters bandwidth", &[64], &[16, 256]),
+    clusters(Family { estimator: Estimator::Residual, ..BANDWIDTH }, "clusters residual", &[16], &[64]),
+    clusters(Family { estimator: Estimator::Preconvolved, ..FULL }, "clusters base", &[1], &[]),
+    supersampled("supersampled 2x2", 2, &[], &[16, 64]),
+    supersampled("supersampled 4x4", 4, &[4], &[16, 64]),
+    supersampled("supersampled 8x8", 8, &[2], &[4, 16]),
+];
+
+const fn of(family: Family, name: &'static str, directions: &'static [u32], more: &'static [u32]) -> Family {
+    Family { name, directions, more, ..family }
+}
+
+const fn point(family: Family, name: &'static str, directions: &'static [u32], more: &'static [u32]) -> Family {
+    Family { change: |c| c.filter = Filter::Point, ..of(family, name, directions, more) }
+}
+
+const fn vmf8(family: Family, name: &'static str, directions: &'static [u32], more: &'static [u32]) -> Family {
+    Family { change: |c| c.filter = Filter::Vmf8, ..of(family, name, directions, more) }
+}
+
+const fn clusters(family: Family, name: &'static str, directions: &'static [u32], more: &'static [u32]) -> Family {
+    Family { change: |c| c.filter = Filter::Clusters, ..of(family, name, directions, more) }
+}
+
+const fn supersampled(name: &'static str, finer: u32, directions: &'static [u32], more: &'static [u32]) -> Family {
+    Family { finer, ..point(FULL, name, directions, more) }
+}
+
 /// Another fit than the default, in the full preset.
 const fn base(name: &'static str, change: fn(&mut Config)) -> Family {
     Family { rate: Rate::Full, estimator: Estimator::Preconvolved, more: &[1], ..further(name, change) }
@@ -123,8 +175,9 @@ pub fn variants(families: &[Family], base: &Settings, all: bool) -> Vec<Variant>
             let Family { rate, estimator, .. } = *family;
             let mut config = Config { rate, estimator, directions: *directions, ..base.config.clone() };
             (family.change)(&mut config);
+            config.extent = config.extent.map(|e| e * family.finer);
             let settings = Settings { config, oracle: family.oracle, ..base.clone() };
-            Variant { name: format!("{} {directions}", family.name), part: family.part, settings }
+            Variant { name: format!("{} {directions}", family.name), part: family.part, settings, finer: family.finer }
         };
         family.directions.iter().chain(more).map(variant).collect::<Vec<_>>()
     };

@@ -9,13 +9,13 @@ pub mod report;
 mod stills;
 mod strips;
 mod times;
-mod truths;
 mod zoom;
 
 use crate::offline::bench::copy_rate;
 use crate::offline::bench::reference::Goal;
 use crate::offline::bench::report::{Head, Seconds};
 use crate::offline::bench::suites::{Keep, Preset};
+use crate::offline::bench::truths::Truths;
 use crate::offline::cache;
 use crate::offline::error::{Error, Result};
 use crate::offline::headless::{Headless, Options};
@@ -30,7 +30,6 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 use times::SetUp;
-use truths::Truths;
 
 /// Whose scenes and aims.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -269,7 +268,7 @@ impl Stage<'_> {
                 samples: truth.directions(),
                 cached: truth.cached,
                 noise,
-                pixels: stills::mask(&truth).iter().filter(|m| **m).count(),
+                pixels: truth.whole().iter().filter(|m| **m).count(),
                 margin: smallest / noise.rmse,
             },
             flicker_noise: moving.map(|moving| moving.noise),

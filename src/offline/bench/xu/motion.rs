@@ -2,10 +2,10 @@
 
 use crate::offline::bench::quality::Frame;
 use crate::offline::bench::reference::Goal;
+use crate::offline::bench::truths::Truths;
 use crate::offline::bench::xu::report::{Flicker, Row};
 use crate::offline::bench::xu::stills::Kept;
-use crate::offline::bench::xu::truths::Truths;
-use crate::offline::bench::xu::{Stage, finite, stills};
+use crate::offline::bench::xu::{Stage, finite};
 use crate::offline::error::Result;
 use crate::offline::metrics::{Pair, Picture, flicker as measure};
 use crate::offline::world::Camera;
@@ -81,7 +81,7 @@ impl Moving {
             for (done, camera) in (1..).zip(&cameras) {
                 let truth = truths.of(camera, extent, &goal, &mut |_, _| ())?;
                 path.truths.push(truth.image().picture);
-                path.masks.push(stills::mask(&truth));
+                path.masks.push(truth.whole());
                 halves.iter_mut().zip(truth.halves()).for_each(|(all, half)| all.push(half));
                 told("moving truths", done, u64::from(FRAMES));
             }

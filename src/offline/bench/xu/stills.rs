@@ -19,8 +19,6 @@ const MARGIN: f64 = 10.0;
 const MOST_FRAMES: [u32; 2] = [8, 16];
 /// Of the maps of filters that are measured together, before the last of them.
 const MOST_BYTES: u64 = 4 << 30;
-/// A pixel is judged if it is covered by this much: of truths, whose sums are rounded.
-const WHOLE: f32 = 0.9999;
 /// Of frames, whose numbers tell them from those that are timed.
 const SEED: u32 = 3;
 
@@ -42,11 +40,6 @@ pub(super) struct Kept {
     pub looks_up: bool,
 }
 
-/// Pixels that surfaces cover wholly.
-pub(super) fn mask(truth: &Converged) -> Vec<bool> {
-    truth.image().coverage.iter().map(|a| *a >= WHOLE).collect()
-}
-
 /// Filters that are measured together, as their maps are in memory together.
 pub(super) struct Group {
     pub stills: Vec<Still>,
@@ -64,7 +57,7 @@ pub(super) fn take<'f>(
     progress: &mut dyn FnMut(u64, u64),
 ) -> Result<(Group, &'f [Filter])> {
     let total = rows.len();
-    let reference = (truth.image().picture, mask(truth));
+    let reference = (truth.image().picture, truth.whole());
     let (mut stills, mut kept): (Vec<Still>, Vec<Kept>) = (Vec::new(), Vec::new());
     let mut rest = filters;
     while let Some((filter, more)) = rest.split_first() {
@@ -161,7 +154,7 @@ fn lobes(session: &mut Session, config: &Config) -> Result<Option<f64>> {
 
 /// Errors of `stills` into their rows.
 pub(super) fn judge(stills: &mut [Still], truth: &Converged, rows: &mut [Row]) -> Result<()> {
-    let (picture, mask) = (truth.image().picture, mask(truth));
+    let (picture, mask) = (truth.image().picture, truth.whole());
     let [a, b] = &truth.halves();
     let noise = quality::noise([a, b], &mask)?.rel_l2;
     let sum = |of: &Picture| -> f64 {

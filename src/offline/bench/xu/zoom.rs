@@ -6,10 +6,10 @@ use crate::offline::animation::AnimatedWorld;
 use crate::offline::bench::quality::Frame;
 use crate::offline::bench::reference::Goal;
 use crate::offline::bench::suites::Preset;
+use crate::offline::bench::truths::Truths;
 use crate::offline::bench::xu::cases::Light;
 use crate::offline::bench::xu::report::{Zoom, ZoomRow};
-use crate::offline::bench::xu::truths::Truths;
-use crate::offline::bench::xu::{Stage, finite, open, stills};
+use crate::offline::bench::xu::{Stage, finite, open};
 use crate::offline::error::Result;
 use crate::offline::metrics::{Exposure, Pair, Picture, compare};
 use crate::offline::session::Session;
@@ -78,7 +78,7 @@ pub(super) fn measure(
     for (done, camera) in (1..).zip(cameras) {
         let truth = truths.of(camera, extent, &goal, &mut |_, _| ())?;
         pictures.push(truth.image().picture);
-        masks.push(stills::mask(&truth));
+        masks.push(truth.whole());
         halves.iter_mut().zip(truth.halves()).for_each(|(all, half)| all.push(half));
         told("truths of the zoom", done, total);
     }

@@ -18,7 +18,7 @@ const VERSION: &str = "passband truth 1";
 const SEED: u32 = 0x7472_7574;
 
 /// Truths of one world from any camera.
-pub(super) struct Truths<'a> {
+pub(crate) struct Truths<'a> {
     world: World,
     device: &'a Options,
     cache: Option<&'a Path>,
