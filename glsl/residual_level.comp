@@ -1,20 +1,31 @@
 #version 460
 // How coarsely each sample's residual may be shaded, by the share of light that the lobes which stand for its material miss: what they
-// miss little of varies little.
+// miss little of varies little. Fits say it; of lobes that the filter found a few directions of each sample do, together with those of
+// the samples about it.
+layout(constant_id = 2) const bool KERNEL = false;
+#define MATERIAL_KERNEL KERNEL
+#define LOBES_BINDING 6
+#define FIT_BINDING 2
+#define SHADOWS_BINDING 4
 #include "frame.glsl"
 #include "gbuffer.glsl"
 #include "materials.glsl"
 #include "local.glsl"
-#define FIT_BINDING 2
-#include "fit.glsl"
+#include "lobes.glsl"
 #include "lights.glsl"
-#define SHADOWS_BINDING 4
 #include "shadows.glsl"
+#include "luminance.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
 
+// Where the filter finds lobes: whether there are materials beside, which stay as they are.
+layout(constant_id = 10) const uint UNFILTERED = 1u;
+#include "surface.glsl"
+#include "approximation.glsl"
+
 layout(set = 2, binding = 1) uniform sampler2D normals; // as the filter pass writes them
 layout(set = 2, binding = 3, r32ui) uniform writeonly uimage2D level;
+layout(set = 2, binding = 5) uniform usampler2D factors;
 
 layout(push_constant) uniform Push {
     vec2 errors; // up to the first the coarsest level, up to the second that of half the pixels a side
@@ -23,16 +34,93 @@ layout(push_constant) uniform Push {
     uint finest;
 } push;
 
-void main() {
-    ivec2 p = ivec2(gl_GlobalInvocationID.xy);
-    if (any(greaterThanEqual(uvec2(p), frame.extent.xy)) || !gbuffer_covered(p)) {
-        return;
+// Each invocation has 2x2 samples, of which one stands for those with found lobes, and is looked at together with that of others.
+const uint DIRECTIONS = 2u;
+const uint TOGETHER = 4u; // a side
+
+shared vec2 missed[64]; // by how much lobes are off, and all, over densities
+
+// Of light by the found lobes, over the density of directions from them.
+vec2 missed_by(Surface s, Approximation a, uint seed) {
+    vec2 sum = vec2(0.0);
+    vec3 wo = s.frame.view;
+    uvec2 seeds = sobol_seeds(seed);
+    for (uint i = 0u; i < DIRECTIONS; ++i) {
+        vec3 wi = lobes_sample(s.material, s.lobes, wo, sobol_point(i, seeds));
+        bool drawn = dot(wi, wi) > 0.0, above = wi.z > 0.0;
+        vec4 value = lobes_evaluate(s.material, s.lobes, drawn ? wi : wo, wo, drawn ? normalize(wi + wo) : wo);
+        float whole = above ? luminance(value.rgb) : 0.0, looked_up = luminance(a.diffuse) * max(wi.z, 0.0);
+        for (uint k = 0u; k < a.count; ++k) {
+            ReflectedLobe lobe = approximation_lobe(s.material, s.lobes, a, k, wo);
+            looked_up += luminance(lobe.weight) * vmf_density(lobe.direction, lobe.kappa, wi);
+        }
+        sum += drawn ? vec2(abs(whole - looked_up), max(whole, looked_up)) / max(value.a, 1e-30) : vec2(0.0);
     }
-    Local f = local_frame(texelFetch(normals, p, 0).xyz, -normalize(frame_ray(p)));
-    Material m;
-    m.record = materials[gbuffer_material(p)];
-    Fit fit = fit_load(m, f.view.z);
-    float error = fit.count > 0u ? fit.error : 1.0;
-    uint found = error <= push.errors.x ? push.coarsest : (error <= push.errors.y ? push.half_rate : push.finest);
-    imageStore(level, p, uvec4(shadow_level(p, found)));
+    return sum;
+}
+
+bool there(ivec2 p) {
+    return all(lessThan(uvec2(p), frame.extent.xy)) && gbuffer_covered(p);
+}
+
+bool has_lobes(ivec2 p) {
+    return there(p) && !found_none(texelFetch(lobes_found, ivec3(p, 0), 0));
+}
+
+Local local_at(ivec2 p, out vec4 normal) {
+    normal = texelFetch(normals, p, 0);
+    return local_frame(normal.xyz, -normalize(frame_ray(p)));
+}
+
+// What the lobes of one of the samples from `corner` on miss.
+vec2 missed_at(ivec2 corner) {
+    uint start = hash(uint(corner.y) << 16 | uint(corner.x));
+    for (uint k = 0u; k < 4u; ++k) {
+        uint which = (start + k) & 3u;
+        ivec2 p = corner + ivec2(which & 1u, which >> 1);
+        if (has_lobes(p)) {
+            vec4 normal;
+            Surface s;
+            s.frame = local_at(p, normal);
+            s.material = material_load(gbuffer_material(p), s.frame.view.z, tangent_turn(s.frame, tangent_decode(normal.xyz, normal.w)),
+                factors_unpack(texelFetch(factors, p, 0)));
+            s.lobes = lobes_load(p, s.frame, s.material);
+            return missed_by(s, approximation_load(s.material, s.lobes, s.frame.view), start);
+        }
+    }
+    return vec2(0.0);
+}
+
+void main() {
+    ivec2 corner = ivec2(gl_GlobalInvocationID.xy) * 2;
+    float of_lobes = 1.0;
+    if (LOBED != 0u) {
+        missed[gl_LocalInvocationIndex] = missed_at(corner);
+        barrier();
+        uvec2 first = gl_LocalInvocationID.xy / TOGETHER * TOGETHER;
+        vec2 sum = vec2(0.0);
+        for (uint i = 0u; i < TOGETHER * TOGETHER; ++i) {
+            sum += missed[(first.y + i / TOGETHER) * 8u + first.x + i % TOGETHER];
+        }
+        of_lobes = sum.y > 0.0 ? sum.x / sum.y : of_lobes;
+    }
+    for (uint k = 0u; k < 4u; ++k) {
+        ivec2 p = corner + ivec2(k & 1u, k >> 1);
+        if (!there(p)) {
+            continue;
+        }
+        float error = 1.0;
+        if (LOBED != 0u && has_lobes(p)) {
+            error = of_lobes;
+        } else {
+            vec4 normal;
+            Local f = local_at(p, normal);
+            Material m;
+            m.record = materials[gbuffer_material(p)];
+            Fit fit = fit_load(m, f.view.z);
+            error = fit.count > 0u ? fit.error : error;
+        }
+        uint found = error <= push.errors.x ? push.coarsest : (error <= push.errors.y ? push.half_rate : push.finest);
+        imageStore(level, p, uvec4(shadow_level(p, found)));
+    }
 }

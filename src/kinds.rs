@@ -1,13 +1,13 @@
 //! What kinds of materials there are, and the passes that are compiled for them.
 
-use crate::config::{Config, Estimator};
+use crate::config::{Config, Estimator, Rate};
 use crate::distribution::Filter;
 use crate::error::Result;
 use crate::gpu::retire::Retired;
 use crate::material::Material;
 use crate::pass::fits::Packed;
 use crate::pass::maps::{MapsUpload, Uses};
-use crate::pass::{PassContext, bandwidth, base, filter, shade};
+use crate::pass::{PassContext, bandwidth, base, filter, residual_level, shade};
 use crate::reflectance::Model;
 
 /// What passes are compiled for, and what bounds their loops. Other materials of the same kinds need no other ones.
@@ -65,6 +65,8 @@ pub(crate) struct OfKinds {
     pub filter: filter::Filter,
     /// Where levels follow from the predicted bandwidth of the image.
     pub bandwidth: Option<bandwidth::Bandwidth>,
+    /// Where levels follow from what look-ups miss.
+    pub residual_level: Option<residual_level::ResidualLevel>,
     /// Where light is looked up.
     pub base: Option<base::Base>,
     /// Where directions are drawn.
@@ -74,10 +76,12 @@ pub(crate) struct OfKinds {
 impl OfKinds {
     pub fn new(p: &mut PassContext<'_, '_>, config: &Config, kinds: Kinds) -> Result<Self> {
         let (looked_up, drawn) = (config.estimator.looks_up(), config.estimator != Estimator::Preconvolved);
+        let by_errors = config.rate == Rate::Bandwidth && !config.predicts();
         Ok(Self {
             kinds,
             filter: filter::Filter::new(p, config, kinds.uses, (kinds.most_clusters, kinds.coloured))?,
             bandwidth: config.predicts().then(|| bandwidth::Bandwidth::new(p, config, kinds)).transpose()?,
+            residual_level: by_errors.then(|| residual_level::ResidualLevel::new(p, config, kinds)).transpose()?,
             base: looked_up.then(|| base::Base::new(p, config, kinds)).transpose()?,
             shade: drawn.then(|| shade::Shade::new(p, config, config.coarsest() > 0, kinds)).transpose()?,
         })
@@ -86,6 +90,9 @@ impl OfKinds {
     pub fn retire(self, bag: &mut Retired) {
         self.filter.retire(bag);
         if let Some(pass) = self.bandwidth {
+            pass.retire(bag);
+        }
+        if let Some(pass) = self.residual_level {
             pass.retire(bag);
         }
         if let Some(pass) = self.base {

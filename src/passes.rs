@@ -10,7 +10,7 @@ use crate::pass::gbuffer::GBuffer;
 use crate::pass::maps::MomentPasses;
 use crate::pass::{
     PassContext, allocate, brdf_map, classify, cluster_moments, curvature, environment_bandwidth, luminance, mixtures, prefilter,
-    pyramid, residual_level, resolve, shading_rate, texture_space, tonemap, upsample, vmf_mips,
+    pyramid, resolve, shading_rate, texture_space, tonemap, upsample, vmf_mips,
 };
 use ash::vk;
 
@@ -24,8 +24,6 @@ pub(crate) struct Passes {
     pub texture_space: Option<texture_space::TextureSpace>,
     pub gbuffer: Option<GBuffer>,
     pub curvature: Option<curvature::Curvature>,
-    /// Where the errors of fits make levels.
-    pub residual_level: Option<residual_level::ResidualLevel>,
     pub luminance: Option<luminance::Luminance>,
     pub pyramid: Option<pyramid::Pyramid>,
     /// Where levels are for hardware, too.
@@ -49,7 +47,6 @@ impl Passes {
         };
         p.bridge.gbuffer = layout(&gbuffer, config);
         let (top, predicted) = (config.coarsest(), config.predicts());
-        let by_fits = config.rate == Rate::Bandwidth && !predicted;
         let (looked_up, drawn) = (config.estimator.looks_up(), config.estimator != Estimator::Preconvolved);
         let allocated = config.allocation != Allocation::Constant;
         Ok(Self {
@@ -70,7 +67,6 @@ impl Passes {
             texture_space: (config.bins == Bins::Camera).then(|| texture_space::TextureSpace::new(&mut p)).transpose()?,
             gbuffer,
             curvature: config.curvature.then(|| curvature::Curvature::new(&mut p)).transpose()?,
-            residual_level: by_fits.then(|| residual_level::ResidualLevel::new(&mut p, config)).transpose()?,
             luminance: (top > 0 && config.rate == Rate::Luminance).then(|| luminance::Luminance::new(&mut p)).transpose()?,
             pyramid: (top > 0).then(|| pyramid::Pyramid::new(&mut p, top)).transpose()?,
             shading_rate: config.shading_rate.map(|rate| shading_rate::RatePass::new(&mut p, rate, config)).transpose()?,
@@ -102,9 +98,6 @@ impl Passes {
             pass.retire(bag);
         }
         if let Some(pass) = self.curvature {
-            pass.retire(bag);
-        }
-        if let Some(pass) = self.residual_level {
             pass.retire(bag);
         }
         if let Some(pass) = self.luminance {

@@ -242,11 +242,23 @@ impl Renderer {
                 rec.image(level, Access::COMPUTE_SAMPLED);
                 Some(level.view)
             }
-            (Some(level), _) if let (Some(pass), Some(fits)) = (&passes.residual_level, &materials.fits) => {
+            (Some(level), _) if let (Some(pass), Some(fits)) = (&of_kinds.residual_level, &materials.fits) => {
                 let area_lights = area > 0;
                 pass.record(
                     rec,
-                    &residual_level::Io { frame, bridge, samplers, normals, materials, fits, area_lights, shadows, level },
+                    &residual_level::Io {
+                        frame,
+                        bridge,
+                        samplers,
+                        normals,
+                        factors,
+                        lobes,
+                        materials,
+                        fits,
+                        area_lights,
+                        shadows,
+                        level,
+                    },
                 );
                 rec.image(level, Access::COMPUTE_SAMPLED);
                 Some(level.view)

@@ -9,7 +9,8 @@ mod support {
 
 use chosen_device::DEVICE;
 use glam::{DVec2, DVec3};
-use passband::distribution::{Budget, LobeFit};
+use passband::distribution::reflected::{ReflectedLobe, reflected};
+use passband::distribution::{Budget, LobeFit, vmf};
 use passband::offline::aov::Aov;
 use passband::offline::builtin;
 use passband::offline::headless::{Headless, Options};
@@ -19,6 +20,7 @@ use passband::offline::reference::MIN_COSINE;
 use passband::offline::render::{Settings, render};
 use passband::offline::session::Session;
 use passband::offline::world::World;
+use passband::reflectance::{Model, Reflectance};
 use passband::{Config, Estimator, Filter, Light, Rate, Requirements};
 use std::sync::OnceLock;
 use support::frames::{config, table, world};
@@ -157,6 +159,62 @@ fn levels_follow_from_errors() {
 }
 
 /// Of area lights the base knows nothing: they are in the residual alone, and are not up-sampled by a factor on what may be dark.
+/// By how much the lobe that stands for a reflectance misses it, seen from `wo`: a share of the larger of both.
+fn missed(model: &Model, wo: DVec3) -> f64 {
+    let (lobes, _) = reflected(model, wo).unwrap();
+    let (rings, spokes) = (90, 120);
+    let (mut off, mut all) = (0.0, 0.0);
+    for i in 0..rings {
+        let theta = std::f64::consts::PI * (f64::from(i) + 0.5) / f64::from(rings);
+        for k in 0..spokes {
+            let (y, x) = (std::f64::consts::TAU * f64::from(k) / f64::from(spokes)).sin_cos();
+            let wi = DVec3::new(theta.sin() * x, theta.sin() * y, theta.cos());
+            let whole = if wi.z > 0.0 { model.evaluate(wi, wo).x * wi.z } else { 0.0 };
+            let density = |l: &ReflectedLobe| vmf::Lobe { mu: l.direction, kappa: l.kappa, weight: l.weight.x }.density(wi);
+            let looked_up: f64 = lobes.iter().map(density).sum();
+            off += theta.sin() * (whole - looked_up).abs();
+            all += theta.sin() * whole.max(looked_up);
+        }
+    }
+    off / all
+}
+
+#[test]
+fn levels_follow_from_what_found_lobes_miss() {
+    let mut world = scene();
+    let model = support::frames::ggx(0.3, DVec3::ONE, DVec3::ZERO);
+    world.materials[0].model = model.clone();
+    let found = Config { filter: Filter::Vmf8, fit_lobes: 24, ..residual(Rate::Bandwidth) };
+    let image = layers(&world, Config { residual_errors: [0.0; 3], ..found.clone() }, &[Aov::Normal]);
+    let normal = ["X", "Y", "Z"].map(|c| layer(&image, &format!("normal.{c}")));
+    let exact: Vec<Option<f64>> = (0..normal[0].len())
+        .map(|i| {
+            let pixel = DVec2::new((i % 96) as f64 + 0.5, (i / 96) as f64 + 0.5);
+            let cosine = DVec3::from(normal.map(|n| n[i].into())).dot(-world.camera.ray(pixel, EXTENT)).clamp(0.02, 1.0);
+            (layer(&image, "A")[i] > 0.0).then(|| missed(&model, DVec3::new((1.0 - cosine * cosine).sqrt(), 0.0, cosine)))
+        })
+        .collect();
+    let mut all: Vec<f64> = exact.iter().flatten().copied().collect();
+    all.sort_by(f64::total_cmp);
+    // Pixels on both sides.
+    let limit = all[all.len() / 2];
+    let image = layers(&world, Config { residual_errors: [0.0, 0.0, limit as f32], ..found }, &[Aov::Decision]);
+    let (mut coarse, mut fine) = ([0; 2], [0; 2]);
+    for (decision, exact) in layer(&image, "decision.Y").iter().zip(&exact) {
+        let Some(exact) = exact else { continue };
+        let count = match exact / limit {
+            r if r < 0.9 => &mut coarse,
+            r if r > 1.1 => &mut fine,
+            _ => continue,
+        };
+        count[usize::from((*decision != 2.0) == (*exact < limit))] += 1;
+    }
+    println!("limit {limit:.3} of {:.3} to {:.3}: coarse {coarse:?}, fine {fine:?}", all[0], all[all.len() - 1]);
+    for [wrong, right] in [coarse, fine] {
+        assert!(right > 100 && wrong * 5 < right, "{wrong} wrong of {}", wrong + right);
+    }
+}
+
 #[test]
 fn area_lights_alone_are_shaded_everywhere() {
     let mut world = scene();

@@ -1,5 +1,5 @@
 //! Pass 4 of residuals: the level of each sample by the error of its material's fit as the viewer sees it
-//! ([`crate::distribution::fit`]).
+//! ([`crate::distribution::fit`]), or by that of the lobes that the filter found.
 
 use crate::config::Config;
 use crate::error::Result;
@@ -10,8 +10,10 @@ use crate::gpu::pipeline::{BridgeSets, ComputePipeline, Interface, Resource};
 use crate::gpu::recorder::Recorder;
 use crate::gpu::retire::Retired;
 use crate::gpu::sampler::Samplers;
+use crate::kinds::Kinds;
 use crate::pass::PassContext;
 use crate::pass::materials::MaterialImages;
+use crate::pass::shade::lobe_constants;
 use ash::vk::{self, DescriptorType as D};
 use bytemuck::{Pod, Zeroable};
 
@@ -25,7 +27,15 @@ pub const INTERFACE: Interface = Interface {
     push_bytes: size_of::<Push>() as u32,
     gbuffer: true,
     materials: true,
-    own: &[D::UNIFORM_BUFFER, D::COMBINED_IMAGE_SAMPLER, D::STORAGE_BUFFER, D::STORAGE_IMAGE, D::COMBINED_IMAGE_SAMPLER],
+    own: &[
+        D::UNIFORM_BUFFER,
+        D::COMBINED_IMAGE_SAMPLER,
+        D::STORAGE_BUFFER,
+        D::STORAGE_IMAGE,
+        D::COMBINED_IMAGE_SAMPLER,
+        D::COMBINED_IMAGE_SAMPLER,
+        D::COMBINED_IMAGE_SAMPLER,
+    ],
 };
 
 #[repr(C)]
@@ -43,6 +53,8 @@ pub(crate) struct Io<'a> {
     pub samplers: &'a Samplers,
     /// Of the `filter` pass.
     pub normals: &'a Image,
+    pub factors: &'a Image,
+    pub lobes: &'a Image,
     pub materials: &'a MaterialImages,
     pub fits: &'a Buffer,
     /// Whether residuals hold area lights, of which fits know nothing: then each sample is shaded for itself.
@@ -56,17 +68,20 @@ pub(crate) struct Io<'a> {
 pub(crate) struct ResidualLevel(ComputePipeline, Push);
 
 impl ResidualLevel {
-    pub fn new(p: &mut PassContext<'_, '_>, config: &Config) -> Result<Self> {
+    pub fn new(p: &mut PassContext<'_, '_>, config: &Config, kinds: Kinds) -> Result<Self> {
         let ([_, coarse, half], above) = (config.residual_errors, config.samples_per_side.ilog2());
         let coarsest = config.coarsest();
         let push = Push { errors: [coarse, half], coarsest, half_rate: coarsest.min(above + 1), finest: coarsest.min(above) };
-        Ok(Self(ComputePipeline::new(p.build, p.modules, &INTERFACE, p.bridge, p.slots, &[])?, push))
+        // Those of lobes are behind six.
+        let own = [0, 0, u32::from(config.widened()), 0, 0, 0];
+        let constants: Vec<_> = own.into_iter().chain(lobe_constants(config, kinds)).collect();
+        Ok(Self(ComputePipeline::new(p.build, p.modules, &INTERFACE, p.bridge, p.slots, &constants)?, push))
     }
 
     pub fn record(&self, rec: &mut Recorder<'_>, io: &Io<'_>) {
         rec.begin(NAME);
         io.materials.sampled(rec);
-        rec.image(io.normals, Access::COMPUTE_SAMPLED);
+        [io.normals, io.factors, io.lobes].into_iter().for_each(|image| rec.image(image, Access::COMPUTE_SAMPLED));
         rec.buffer(io.fits, Access::COMPUTE_READ);
         rec.overwrite(io.level, Access::COMPUTE_WRITE);
         rec.flush();
@@ -76,10 +91,13 @@ impl ResidualLevel {
             Resource::Buffer(io.fits),
             Resource::Storage(io.level.view),
             Resource::View(io.shadows, io.samplers.nearest),
+            Resource::Sampled(io.factors, io.samplers.nearest),
+            Resource::Sampled(io.lobes, io.samplers.nearest),
         ];
         let errors = if io.area_lights { [-1.0; 2] } else { self.1.errors };
         self.0.bind(rec, io.bridge, &resources, &Push { errors, ..self.1 });
-        self.0.dispatch(rec, io.level.extent());
+        // 2x2 samples each.
+        self.0.dispatch(rec, io.level.extent().map(|e| e.div_ceil(2)));
         rec.end();
     }
 
