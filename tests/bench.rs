@@ -288,7 +288,7 @@ fn what_cannot_be_done_is_one_line() {
     let cases: [(&[&str], &[&str]); 9] = [
         (&[], &["--suite"]),
         (&["--suite", "fast"], &["fast", "passes", "bagher"]),
-        (&["--suite", "joined"], &["not supported yet", "--suite"]),
+        (&["--suite", "scaling"], &["not supported yet", "--suite"]),
         (&["--suite", "passes", "--rounds", "0"], &["--rounds"]),
         (&["--suite", "passes", "--report", "out.html"], &["not supported yet", "--report"]),
         (&["--suite", "passes", "trio", "nowhere"], &["scene", "nowhere"]),
