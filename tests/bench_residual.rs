@@ -58,6 +58,9 @@ fn what_is_looked_up_is_compared_timed_and_drawn() {
     let ms = |i: usize, time: &str| number(&rebuilt[i][time]["median"]);
     assert!(ms(0, "prefilter_ms") > ms(1, "prefilter_ms") && ms(1, "prefilter_ms") > 0.0, "{rebuilt:?}");
     assert!(["upload_ms", "prepare_ms"].iter().all(|time| ms(0, time) > 0.0));
+    // Two images with mips: four times the texels take four times the bytes, but for irradiance.
+    let bytes = |i: usize| number(&rebuilt[i]["prefiltered_bytes"]);
+    assert!(bytes(0) > 20e6 && bytes(0) < 4.1 * bytes(1) && bytes(0) > 3.5 * bytes(1), "{rebuilt:?}");
     assert!(scene["environment"] == Value::Null && rebuilt[0]["bandwidth_ms"] == Value::Null);
 
     let figure = image::open(folder.0.join("figures/small-parts.png")).unwrap().to_rgb8();

@@ -179,6 +179,13 @@ fn starts(chain: Chain) -> [u64; 4] {
     [0, second, irradiance, irradiance + texels_below(IRRADIANCE, 1)]
 }
 
+/// Bytes of what is looked up of an environment of `size`.
+#[cfg(feature = "offline")]
+pub(crate) fn bytes(size: [u32; 2]) -> u64 {
+    let [.., end] = starts(Chain::of(size));
+    end * TEXEL
+}
+
 /// The finest level of [`SOURCE_WIDTH`] columns, the last of which there is a grid.
 fn grid_levels(chain: Chain) -> u32 {
     (chain.width / SOURCE_WIDTH).ilog2()

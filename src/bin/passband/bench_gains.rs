@@ -186,8 +186,11 @@ pub fn rebuilt(scenes: &[SceneReport]) -> String {
     let row = |(scene, e): (&SceneReport, &EnvironmentTimes)| {
         let ms = [e.prefilter_ms?, e.upload_ms, e.prepare_ms].map(|s| format!("{:.2}", s.median));
         let frame = scene.row("base 1").map_or(String::new(), |row| format!("{:.2}", row.frame_ms.median));
-        Some([scene.name.clone(), format!("{}x{}", e.extent[0], e.extent[1])].into_iter().chain(ms).chain([frame]).collect())
+        let looked_up = format!("{:.1}", e.prefiltered_bytes? as f64 * 1e-6);
+        let size = format!("{}x{}", e.extent[0], e.extent[1]);
+        Some([scene.name.clone(), size].into_iter().chain(ms).chain([frame, looked_up]).collect())
     };
-    let header = ["environment of", "map", "prefilter ms", "upload ms", "CPU: tables ms", "frame of the base ms"];
+    let header =
+        ["environment of", "map", "prefilter ms", "upload ms", "CPU: tables ms", "frame of the base ms", "looked up: MB"];
     aligned(&header, 1, rows.filter_map(row))
 }

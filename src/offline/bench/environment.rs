@@ -36,6 +36,8 @@ pub struct EnvironmentTimes {
     pub bandwidth_ms: Option<Summary>,
     /// GPU milliseconds of the pass `prefilter`, if that is what is made.
     pub prefilter_ms: Option<Summary>,
+    /// Bytes of what that pass makes, which is looked up.
+    pub prefiltered_bytes: Option<u64>,
 }
 
 /// What is made of an environment beside its tables.
@@ -115,6 +117,7 @@ pub fn times(map: &LatLong, base: &Settings, rounds: u32, what: Rebuilt) -> Resu
         upload_ms: of(environment::NAME),
         bandwidth_ms: (what == Rebuilt::Bandwidth).then(|| of(environment_bandwidth::NAME)),
         prefilter_ms: (what == Rebuilt::Prefilter).then(|| of(prefilter::NAME)),
+        prefiltered_bytes: (what == Rebuilt::Prefilter).then(|| prefilter::bytes([map.width(), map.height()])),
     })
 }
 
