@@ -77,7 +77,6 @@ struct Found {
     vec3 mean;       // of their directions, stored as x, y, 1 - z
     uint lobes;      // LOBES_* of moments.glsl
     float area;      // mean cosine of the lobes below, about the normals that they have there
-    vec3 specular;   // of the place
 };
 const float MATTERS = 0.02;
 
@@ -323,7 +322,7 @@ void main() {
         n = record.places.z != 0u && t.w != 0.0 ? bent : n;
     }
     if (LOBES != 0u) {
-        Found found = Found(tangent_frame(n, t), f.kernel, 0u, 0.0, vec3(0.0), record.lobes, 1.0, f.specular);
+        Found found = Found(tangent_frame(n, t), f.kernel, 0u, 0.0, vec3(0.0), record.lobes, 1.0);
         if (record.moments != 0u) {
             decode(p, record, uv, footprint, found);
         } else if (filter_of_slopes(FILTER)) {

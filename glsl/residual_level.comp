@@ -1,7 +1,6 @@
 #version 460
 // How coarsely each sample's residual may be shaded, by the share of light that the lobes which stand for its material miss: what they
-// miss little of varies little. Fits say it; of lobes that the filter found a few directions of each sample do, together with those of
-// the samples about it.
+// miss little of varies little. Fits say it; of lobes that the filter found a few directions do.
 layout(constant_id = 2) const bool KERNEL = false;
 #define MATERIAL_KERNEL KERNEL
 #define LOBES_BINDING 6
@@ -34,13 +33,16 @@ layout(push_constant) uniform Push {
     uint finest;
 } push;
 
-// Each invocation has 2x2 samples, of which one stands for those with found lobes, and is looked at together with that of others.
+// Each invocation has 2x2 samples. One of those with found lobes stands for them: so many directions of it, together with those of
+// other invocations, so many a side, of the same material.
 const uint DIRECTIONS = 2u;
-const uint TOGETHER = 4u; // a side
+const uint TOGETHER = 4u;
 
-shared vec2 missed[64]; // by how much lobes are off, and all, over densities
+const uint NO_MATERIAL = 0xffffffffu;
+shared vec2 missed[64]; // sums of |f - a| and of the larger of both, each over the density of its direction
+shared uint missed_by_material[64];
 
-// Of light by the found lobes, over the density of directions from them.
+// Those of directions from the found lobes.
 vec2 missed_by(Surface s, Approximation a, uint seed) {
     vec2 sum = vec2(0.0);
     vec3 wo = s.frame.view;
@@ -64,7 +66,12 @@ bool there(ivec2 p) {
 }
 
 bool has_lobes(ivec2 p) {
-    return there(p) && !found_none(texelFetch(lobes_found, ivec3(p, 0), 0));
+    bool some = false;
+    if (there(p)) {
+        uvec4 first = texelFetch(lobes_found, ivec3(p, 0), 0);
+        some = SLOPES != 0u ? uintBitsToFloat(first.z) > 0.0 : !found_none(first);
+    }
+    return some;
 }
 
 Local local_at(ivec2 p, out vec4 normal) {
@@ -73,7 +80,8 @@ Local local_at(ivec2 p, out vec4 normal) {
 }
 
 // What the lobes of one of the samples from `corner` on miss.
-vec2 missed_at(ivec2 corner) {
+vec2 missed_at(ivec2 corner, out uint material) {
+    material = NO_MATERIAL;
     uint start = hash(uint(corner.y) << 16 | uint(corner.x));
     for (uint k = 0u; k < 4u; ++k) {
         uint which = (start + k) & 3u;
@@ -81,8 +89,9 @@ vec2 missed_at(ivec2 corner) {
         if (has_lobes(p)) {
             vec4 normal;
             Surface s;
+            material = gbuffer_material(p);
             s.frame = local_at(p, normal);
-            s.material = material_load(gbuffer_material(p), s.frame.view.z, tangent_turn(s.frame, tangent_decode(normal.xyz, normal.w)),
+            s.material = material_load(material, s.frame.view.z, tangent_turn(s.frame, tangent_decode(normal.xyz, normal.w)),
                 factors_unpack(texelFetch(factors, p, 0)));
             s.lobes = lobes_load(p, s.frame, s.material);
             return missed_by(s, approximation_load(s.material, s.lobes, s.frame.view), start);
@@ -94,13 +103,16 @@ vec2 missed_at(ivec2 corner) {
 void main() {
     ivec2 corner = ivec2(gl_GlobalInvocationID.xy) * 2;
     float of_lobes = 1.0;
+    uint material = NO_MATERIAL;
     if (LOBED != 0u) {
-        missed[gl_LocalInvocationIndex] = missed_at(corner);
+        missed[gl_LocalInvocationIndex] = missed_at(corner, material);
+        missed_by_material[gl_LocalInvocationIndex] = material;
         barrier();
         uvec2 first = gl_LocalInvocationID.xy / TOGETHER * TOGETHER;
         vec2 sum = vec2(0.0);
         for (uint i = 0u; i < TOGETHER * TOGETHER; ++i) {
-            sum += missed[(first.y + i / TOGETHER) * 8u + first.x + i % TOGETHER];
+            uint other = (first.y + i / TOGETHER) * 8u + first.x + i % TOGETHER;
+            sum += missed_by_material[other] == material ? missed[other] : vec2(0.0);
         }
         of_lobes = sum.y > 0.0 ? sum.x / sum.y : of_lobes;
     }
@@ -111,7 +123,8 @@ void main() {
         }
         float error = 1.0;
         if (LOBED != 0u && has_lobes(p)) {
-            error = of_lobes;
+            // Another material in the same 2x2 is at an edge.
+            error = gbuffer_material(p) == material ? of_lobes : error;
         } else {
             vec4 normal;
             Local f = local_at(p, normal);

@@ -200,7 +200,8 @@ pub struct Config {
     /// The mean error of a fit at which fewer lobes are enough, 0 to 1.
     pub fit_error: f64,
     /// Errors of a fit up to which the residual of [`Estimator::Residual`] is left out, unless it holds area lights; with [`Rate::Bandwidth`] is shaded at the
-    /// coarsest level; is shaded at that of half the pixels a side. Beyond it is shaded at every sample.
+    /// coarsest level; is shaded at that of half the pixels a side. Beyond it is shaded at every sample. Lobes that a filter found are never
+    /// left out; levels follow from what they are measured to miss.
     pub residual_errors: [f32; 3],
     /// Whether lobes are taken to be what look-ups of them hold, texel by texel, and none to be sharper than the sharpest level: with
     /// [`Estimator::Cv`] nothing is left that makes its mean wrong, at several times the cost. To test with.

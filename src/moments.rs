@@ -150,7 +150,9 @@ pub(crate) fn clusters(material: &Material, base: &Base, filter: Filter) -> Opti
         });
         effective::lobes(lobes.as_deref().unwrap_or(plain), normal, Rule::Exact)
     };
-    let colour = |map: &Texture, i: usize| map.sample(centre(i), 0.0).truncate();
+    // At the level of whose texels one here has about one.
+    let finer = |map: &Texture| (0..2).map(|a| f64::from(map.size()[a]) / f64::from(size[a])).fold(1.0, f64::max).log2();
+    let colour = |map: &Texture, i: usize| map.sample(centre(i), finer(map)).truncate();
     let specular = material.maps.specular.as_ref();
     let colours = specular.map(|map| move |i| colour(map, i));
     Some(Clusters::of(size, !base.upright(), &texel, colours.as_ref().map(|c| c as &Colours<'_>)))

@@ -158,7 +158,6 @@ fn levels_follow_from_errors() {
     }
 }
 
-/// Of area lights the base knows nothing: they are in the residual alone, and are not up-sampled by a factor on what may be dark.
 /// By how much the lobe that stands for a reflectance misses it, seen from `wo`: a share of the larger of both.
 fn missed(model: &Model, wo: DVec3) -> f64 {
     let (lobes, _) = reflected(model, wo).unwrap();
@@ -215,6 +214,7 @@ fn levels_follow_from_what_found_lobes_miss() {
     }
 }
 
+/// Of area lights the base knows nothing: they are in the residual alone, and are not up-sampled by a factor on what may be dark.
 #[test]
 fn area_lights_alone_are_shaded_everywhere() {
     let mut world = scene();

@@ -1,5 +1,5 @@
 // A lobe that the filter found at a sample, in 16 bytes: direction, the normal of the surface below it, concentration and weight,
-// which is above 0. Elliptic lobes have the direction in two numbers of 22 bits, and beside these, in 10 bits each, the angle of the
+// which is above 0, so that its sign says something else (FOUND_COLOURED). Elliptic lobes have the direction in two numbers of 22 bits, and beside these, in 10 bits each, the angle of the
 // axis along which they are the widest and how many times as wide as across they are; the normal is in two numbers of 12 bits, beside
 // how many times as concentrated as across the lobes are of which it is made.
 #ifndef FOUND_GLSL
@@ -58,8 +58,8 @@ float found_stretch(uvec4 u) {
     return exp2(float(u.y & 1023u) * (0.5 * FOUND_MOST_RATIO / FOUND_RATIOS));
 }
 
-// Colours of the first four lobes over that of the place, in 32 bits each (9 of each component, a common exponent), are in the last layer
-// where lobes say so.
+// The sign of a lobe's weight: colours of the first four lobes over their mean, in 32 bits each (9 of each component, a common exponent), are
+// in the last layer.
 const uint FOUND_COLOURED = 0x8000u;
 
 uint found_pack_colour(vec3 c) {

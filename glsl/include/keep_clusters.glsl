@@ -83,6 +83,14 @@ void decode_clusters(ivec2 p, MapRecord record, vec2 uv, Reach r, uint lobe_laye
     vec3 sum = vec3(0.0);
     float mass = 0.0;
     f.area = record.facing;
+    // Over their own mean: what the map of colours has beyond the moments' size stays.
+    vec3 mean = vec3(0.0);
+    float all_mass = 0.0;
+    for (uint i = 0u; i < (coloured ? min(all, MOST_COLOURED) : 0u); ++i) {
+        mean += firsts[i].x > LEAST_WEIGHT ? thirds[i] : vec3(0.0);
+        all_mass += firsts[i].x > LEAST_WEIGHT ? firsts[i].x : 0.0;
+    }
+    mean /= max(all_mass, LEAST_WEIGHT);
     uvec4 colours = uvec4(0u);
     for (uint i = 0u; i < CLUSTERS; ++i) {
         float q = i < all ? firsts[i].x : 0.0;
@@ -91,7 +99,7 @@ void decode_clusters(ivec2 p, MapRecord record, vec2 uv, Reach r, uint lobe_laye
             Ellipse e = cluster_decode(c, firsts[i], seconds[i].xy);
             if (coloured && i < MOST_COLOURED) {
                 vec3 colour = thirds[min(i, MOST_COLOURED - 1u)] / q;
-                colours[min(f.count, 3u)] = found_pack_colour(mix(vec3(1.0), colour / max(f.specular, 1e-6), greaterThan(f.specular, vec3(1e-6))));
+                colours[min(f.count, 3u)] = found_pack_colour(mix(vec3(1.0), colour / max(mean, 1e-9), greaterThan(mean, vec3(1e-9))));
             }
             vec3 below = record.upright != 0u ? e.mu : stereographic_direction(seconds[i].zw / q);
             keep_ellipse(p, f, e, q, c.own.x, below, coloured ? FOUND_COLOURED : 0u);

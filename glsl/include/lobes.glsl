@@ -104,7 +104,8 @@ Lobes lobes_load(ivec2 p, Local f, Material m) {
             lobe_normal[i] = normal;
             if (COLOURED) {
                 bool own = (found.w & FOUND_COLOURED) != 0u;
-                lobe_colour[i] = m.record.f0.rgb * (own ? found_colour(colours[min(i, 3u)]) : vec3(1.0));
+                vec3 colour = m.record.f0.rgb * (own ? found_colour(colours[min(i, 3u)]) : vec3(1.0));
+                lobe_colour[i] = ggx || cosine ? min(colour, 1.0) : colour;
             }
             if (ELLIPTIC != 0u) {
                 vec3 x, y;

@@ -251,10 +251,11 @@ fn exact(lobes: &[(Lobe, DVec3)], h: DVec3) -> DVec3 {
 }
 
 impl Block {
-    /// Its lobes of one class.
+    /// Its lobes of one class, without their colours.
     fn of_class(&self, bound: f64) -> Option<Self> {
         let class = Cluster { bound, inverse: [0.0; 3], ..round(DVec2::ZERO) };
-        let lobes: Vec<_> = self.lobes.iter().filter(|(l, _)| class.distance(&Placed::of(l)) < 1.0).copied().collect();
+        let lobes: Vec<_> =
+            self.lobes.iter().map(|(l, _)| (*l, DVec3::ONE)).filter(|(l, _)| class.distance(&Placed::of(l)) < 1.0).collect();
         let half = self.half.iter().map(|(h, _)| (*h, exact(&lobes, *h))).collect();
         (!lobes.is_empty()).then_some(Self { size: self.size, half, lobes })
     }

@@ -137,7 +137,7 @@ impl Cluster {
 }
 
 impl Clusters {
-    /// At least one, of which no more than [`Self::most`] count.
+    /// At least one, of which no more than [`Layout::most`] count.
     pub(crate) fn new(mut all: Vec<Cluster>, layout: Layout) -> Self {
         all.truncate(layout.most());
         if all.is_empty() {

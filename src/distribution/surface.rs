@@ -34,7 +34,7 @@ pub struct FoundLobes {
     /// The concentrations of the lobes below each, beside which the rest of its width is the spread of their normals: towards a half
     /// vector the normal is that of the places whose lobes are there. None where normals stay the mean ones.
     pub own: Vec<f64>,
-    /// The factor on the specular colour of each; none where they share that of the place.
+    /// The factor on the specular colour of each, of which their mean is the place's; none where they share that.
     pub colours: Vec<DVec3>,
     /// The mean cosine of the directions of a place's lobes to its normal.
     pub facing: f64,
@@ -43,6 +43,13 @@ pub struct FoundLobes {
 }
 
 impl FoundLobes {
+    /// The mean of the lobes' colours; 0 without.
+    fn mean_colour(&self) -> DVec3 {
+        let Mixture::Elliptic(lobes) = &self.lobes else { return DVec3::ZERO };
+        let weights: f64 = lobes.iter().map(|l| l.round.weight).sum();
+        self.colours.iter().zip(lobes).map(|(colour, l)| *colour * l.round.weight).sum::<DVec3>() / weights
+    }
+
     /// The same with `kernel` added to every lobe's 2 / concentration, that is half of it to every variance of slopes.
     pub fn widened(mut self, kernel: f64) -> Self {
         match &mut self.lobes {
@@ -107,11 +114,11 @@ pub struct Surface {
 }
 
 impl Surface {
-    /// `model` with `found`. `specular` is the factor on specular colours there, which is in the model's already but for vMF lobes, `base`
-    /// the albedo under these.
+    /// `model` with `found`. `specular` and `base` are a factor on, and the albedo under, vMF lobes.
     pub fn new(model: Model, found: &FoundLobes, specular: DVec3, base: DVec3) -> Self {
         let frame = effective::about(found.normal).transpose();
         let area = |kappa| mean_cosine(&model, kappa);
+        let mean = found.mean_colour();
         let of = |i: usize| found.mass.map_or_else(|| found.below.get(i).map_or(1.0, |kappa| area(*kappa)), |mass| 1.0 / mass);
         let turned = |(i, l): (usize, elliptic::Lobe)| {
             let weight = l.round.weight * area(l.round.kappa) / (found.facing * of(i));
@@ -121,7 +128,7 @@ impl Surface {
             });
             let round = Lobe { mu: frame * l.round.mu, weight, ..l.round };
             let part = |own: f64, all: f64| if all > 0.0 { own / all } else { 1.0 };
-            let over = |own: &DVec3| DVec3::from_array([0, 1, 2].map(|c| part(own[c], specular[c])));
+            let over = |own: &DVec3| DVec3::from_array([0, 1, 2].map(|c| part(own[c], mean[c])));
             let colour = found.colours.get(i).map_or(DVec3::ONE, over);
             Facet { lobe: elliptic::Lobe { round, axis: frame * l.axis, ..l }, normal, follows, colour }
         };
@@ -144,7 +151,11 @@ impl Surface {
 
     /// Fresnel reflectance of a specular colour.
     fn fresnel(&self, specular: DVec3, cosine: f64) -> DVec3 {
-        if matches!(self.model, Model::Ggx(_)) { ggx::schlick(specular, cosine) } else { specular }
+        match self.model {
+            Model::Ggx(_) => ggx::schlick(specular.min(DVec3::ONE), cosine),
+            Model::BlinnPhong(_) => specular.min(DVec3::ONE),
+            _ => specular,
+        }
     }
 
     /// `D G / (4 cos cos)` of a facet whose normal has the cosines `ci`, `co` and `ch` to light, viewer and half vector; `square` is the

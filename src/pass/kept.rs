@@ -40,11 +40,18 @@ impl Table {
             let colours = |m: &Material| m.maps.specular.as_ref().map(Arc::as_ptr);
             let same = |m: &Material| same_maps(m, material) && colours(m) == colours(material);
             let known = (0..i).find(|k| bases.get(*k) == Some(base) && same(&materials[*k]));
+            // Without colours all of the same maps share what they keep.
+            let alike = |k: &usize| bases.get(*k) == Some(base) && same_maps(&materials[*k], material);
+            let shared = (0..i).filter(alike).filter_map(|k| table.of.get(k)).find(|own| !own.coloured && own.count > 0).copied();
             let own = match known.and_then(|k| table.of.get(k)) {
                 Some(own) => *own,
                 None => {
                     let own = base.as_ref().and_then(|base| moments::clusters(material, base, filter));
-                    own.map_or(Own::default(), |clusters| table.push(&clusters))
+                    match (own, shared) {
+                        (Some(clusters), Some(shared)) if !clusters.layout().colours => shared,
+                        (Some(clusters), _) => table.push(&clusters),
+                        (None, _) => Own::default(),
+                    }
                 }
             };
             table.of.push(own);

@@ -37,7 +37,7 @@ impl Found {
         for [x, y, normal, rest] in texels.take_while(|t| t[3] & 0xffff != 0) {
             let signed = |bits: u32| (f64::from(bits as u16 as i16) / 32767.0).max(-1.0);
             let kappa = (f64::from(rest >> 16) * 48.0 / 65535.0 - 16.0).exp2();
-            let weight = f64::from(half::f16::from_bits(rest as u16));
+            let weight = f64::from(half::f16::from_bits(rest as u16 & 0x7fff));
             lobes.push(Lobe { mu: local.transpose() * oct([x, y].map(|b| f64::from(f32::from_bits(b)))), kappa, weight });
             normals.push(local.transpose() * oct([normal, normal >> 16].map(signed)));
         }

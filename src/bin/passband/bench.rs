@@ -33,8 +33,8 @@ pub struct Args {
     /// What to measure
     #[arg(long)]
     suite: Suite,
-    /// How much of it: few scenes at 256x256, or all at 512x512; of xu and tan some at 128x128, or all at 256x256 and in
-    /// motion
+    /// How much of it: few scenes at 256x256, or all at 512x512; of xu, tan and joined some at 128x128, or all at 256x256, of the
+    /// first two in motion, too
     #[arg(long, default_value = "quick")]
     preset: Preset,
     /// Timed frames of each variant [default: 5 of quick, 9 of full; of xu and tan 3 and 7]

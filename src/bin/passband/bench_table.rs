@@ -77,7 +77,10 @@ pub fn text(report: &Report) -> String {
 
 /// Scenes that lack files, if there are any.
 pub(super) fn skipped(all: &[Skipped]) -> Option<String> {
-    let lines = all.iter().map(|s| format!("  {}: scripts/fetch-assets {}", s.scene, s.needs.join(" ")));
+    let lines = all.iter().map(|s| match s.needs.as_slice() {
+        [] => format!("  {}: run it in the repository", s.scene),
+        needs => format!("  {}: scripts/fetch-assets {}", s.scene, needs.join(" ")),
+    });
     (!all.is_empty()).then(|| format!("Skipped, as files are missing:\n{}", lines.collect::<Vec<_>>().join("\n")))
 }
 

@@ -160,7 +160,8 @@ impl Case {
         matches!(self.mesh, "sphere" | "torus-knot" | "bunny")
     }
 
-    /// The scene under `root` (the repository), or the names of what `scripts/fetch-assets` has to fetch for it.
+    /// The scene under `root` (the repository), or the names of what `scripts/fetch-assets` has to fetch for it; none of what is
+    /// in the repository itself.
     ///
     /// # Errors
     /// Of the scene file.
@@ -172,7 +173,8 @@ impl Case {
         let mut missing = Vec::new();
         missing.extend(file.filter(|[file, _]| !assets.join(file).is_file()).map(|[_, asset]| asset));
         missing.extend((!builtin && !map.is_file()).then_some("environments"));
-        if !missing.is_empty() {
+        let table = RGL.iter().find(|(name, _)| *name == self.reflectance);
+        if !missing.is_empty() || table.is_some_and(|(_, path)| !root.join(path).is_file()) {
             return Ok(Err(missing));
         }
         // A path in an override is relative to the scene file, unless it is absolute. As a TOML literal, for backslashes.
@@ -182,7 +184,6 @@ impl Case {
             false => ("environment.map".to_string(), literal(map)),
         };
         let model = MODELS.iter().find(|(name, _)| *name == self.reflectance).map(|(_, model)| model.to_string());
-        let table = RGL.iter().find(|(name, _)| *name == self.reflectance);
         let model = model.or_else(|| table.map(|(_, path)| format!("{{ rgl = {} }}", literal(root.join(path)))));
         let reflectance = match model {
             Some(model) => Some((format!("materials.{material}.reflectance"), model)),

@@ -53,6 +53,8 @@ pub struct Stage<'a> {
     pub base: &'a Settings,
     /// Its converged image.
     pub reference: &'a Converged,
+    /// The pixels of it over which errors are found.
+    pub mask: Vec<bool>,
     /// What was measured in it.
     pub found: &'a SceneReport,
 }
@@ -107,7 +109,7 @@ impl Stage<'_> {
     pub(super) fn shot(&self, config: Config, aovs: &[Aov]) -> Result<Shot> {
         let Rendered { image, stats } = self.render(config, aovs, true)?;
         let frame = Frame { picture: picture(&image), coverage: image.channel("A").unwrap_or_default().to_vec() };
-        let error = quality::error(&[frame], &self.truth(), &self.reference.mask())?;
+        let error = quality::error(&[frame], &self.truth(), &self.mask)?;
         let shaded = stats.pixels.shaded as f64 / stats.pixels.covered.max(1) as f64;
         Ok(Shot { image, shaded, ms: stats.frame_ms.median, error })
     }

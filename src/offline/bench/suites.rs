@@ -236,7 +236,8 @@ impl Run<'_, '_, '_> {
             }
             if let Some(keep) = self.keep.as_mut().filter(|_| pictured) {
                 told(self.progress, "figures");
-                let stage = figures::Stage { world: &world, base: &base, reference: &reference, found: &found };
+                let mask = if order.suite == Suite::Joined { reference.whole() } else { reference.mask() };
+                let stage = figures::Stage { world: &world, base: &base, reference: &reference, mask, found: &found };
                 match order.suite {
                     Suite::Residual => keep(name, stage.parts()?)?,
                     Suite::Joined => keep(name, stage.together()?)?,

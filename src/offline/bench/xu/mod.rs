@@ -231,7 +231,10 @@ impl Stage<'_> {
             Preset::Quick => None,
             Preset::Full => Some(motion::Moving::new(self, &mut report.seconds.references, &mut told)?),
         };
-        let (mut stills, mut costs, mut rest) = (Vec::new(), None, self.order.filters.as_slice());
+        // Those that others are compared with are of the first group.
+        let mut filters = self.order.filters.clone();
+        filters.sort_by_key(|filter| !times::COMPARED.contains(filter));
+        let (mut stills, mut costs, mut rest) = (Vec::new(), None, filters.as_slice());
         while !rest.is_empty() {
             let (group, more) = stills::take(self, &truth, rest, &mut rows, &mut |done, total| told("images", done, total))?;
             let mut kept = group.kept;

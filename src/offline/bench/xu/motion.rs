@@ -68,7 +68,7 @@ pub(super) struct Moving {
 }
 
 impl Moving {
-    /// `references` is how long truths took.
+    /// How long truths took is added to `references`.
     pub fn new(stage: &Stage<'_>, references: &mut f64, told: &mut dyn FnMut(&str, u64, u64)) -> Result<Self> {
         let clock = Instant::now();
         let extent = stage.config.extent.map(|e| e.min(MOST_SIDE));

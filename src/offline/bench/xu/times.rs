@@ -23,7 +23,8 @@ use std::sync::Arc;
 const FINER: u32 = 8;
 /// Directions where a material refuses the estimator preconvolved.
 const DIRECTIONS: u32 = 64;
-/// The filter that others are compared with.
+/// The filters that others are compared with: in memory, and in time.
+pub(super) const COMPARED: [Filter; 2] = [Filter::Point, Filter::Lean];
 const LEAN: &str = "lean";
 
 /// What was found beside the rows.
