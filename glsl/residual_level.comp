@@ -44,19 +44,28 @@ shared uint missed_by_material[64];
 
 // Those of directions from the found lobes.
 vec2 missed_by(Surface s, Approximation a, uint seed) {
-    vec2 sum = vec2(0.0);
-    vec3 wo = s.frame.view;
+    vec3 wo = s.frame.view, directions[DIRECTIONS];
+    float whole[DIRECTIONS], looked_up[DIRECTIONS], per_density[DIRECTIONS];
     uvec2 seeds = sobol_seeds(seed);
     for (uint i = 0u; i < DIRECTIONS; ++i) {
         vec3 wi = lobes_sample(s.material, s.lobes, wo, sobol_point(i, seeds));
-        bool drawn = dot(wi, wi) > 0.0, above = wi.z > 0.0;
-        vec4 value = lobes_evaluate(s.material, s.lobes, drawn ? wi : wo, wo, drawn ? normalize(wi + wo) : wo);
-        float whole = above ? luminance(value.rgb) : 0.0, looked_up = luminance(a.diffuse) * max(wi.z, 0.0);
-        for (uint k = 0u; k < a.count; ++k) {
-            ReflectedLobe lobe = approximation_lobe(s.material, s.lobes, a, k, wo);
-            looked_up += luminance(lobe.weight) * vmf_density(lobe.direction, lobe.kappa, wi);
+        bool drawn = dot(wi, wi) > 0.0;
+        wi = drawn ? wi : wo;
+        vec4 value = lobes_evaluate(s.material, s.lobes, wi, wo, normalize(wi + wo));
+        directions[i] = wi;
+        whole[i] = wi.z > 0.0 ? luminance(value.rgb) : 0.0;
+        looked_up[i] = luminance(a.diffuse) * max(wi.z, 0.0);
+        per_density[i] = drawn ? 1.0 / max(value.a, 1e-30) : 0.0;
+    }
+    for (uint k = 0u; k < a.count; ++k) {
+        ReflectedLobe lobe = approximation_lobe(s.material, s.lobes, a, k, wo);
+        for (uint i = 0u; i < DIRECTIONS; ++i) {
+            looked_up[i] += luminance(lobe.weight) * vmf_density(lobe.direction, lobe.kappa, directions[i]);
         }
-        sum += drawn ? vec2(abs(whole - looked_up), max(whole, looked_up)) / max(value.a, 1e-30) : vec2(0.0);
+    }
+    vec2 sum = vec2(0.0);
+    for (uint i = 0u; i < DIRECTIONS; ++i) {
+        sum += vec2(abs(whole[i] - looked_up[i]), max(whole[i], looked_up[i])) * per_density[i];
     }
     return sum;
 }
@@ -79,25 +88,29 @@ Local local_at(ivec2 p, out vec4 normal) {
     return local_frame(normal.xyz, -normalize(frame_ray(p)));
 }
 
-// What the lobes of one of the samples from `corner` on miss.
+// What the lobes of one of the samples from `corner` on miss. Chosen first: some devices run a loop's body masked, so often as the last of
+// their lanes needs it.
 vec2 missed_at(ivec2 corner, out uint material) {
-    material = NO_MATERIAL;
     uint start = hash(uint(corner.y) << 16 | uint(corner.x));
+    ivec2 p = ivec2(-1);
     for (uint k = 0u; k < 4u; ++k) {
         uint which = (start + k) & 3u;
-        ivec2 p = corner + ivec2(which & 1u, which >> 1);
-        if (has_lobes(p)) {
-            vec4 normal;
-            Surface s;
-            material = gbuffer_material(p);
-            s.frame = local_at(p, normal);
-            s.material = material_load(material, s.frame.view.z, tangent_turn(s.frame, tangent_decode(normal.xyz, normal.w)),
-                factors_unpack(texelFetch(factors, p, 0)));
-            s.lobes = lobes_load(p, s.frame, s.material);
-            return missed_by(s, approximation_load(s.material, s.lobes, s.frame.view), start);
-        }
+        ivec2 q = corner + ivec2(which & 1u, which >> 1);
+        p = p.x < 0 && has_lobes(q) ? q : p;
     }
-    return vec2(0.0);
+    vec2 found = vec2(0.0);
+    material = NO_MATERIAL;
+    if (p.x >= 0) {
+        vec4 normal;
+        Surface s;
+        material = gbuffer_material(p);
+        s.frame = local_at(p, normal);
+        s.material = material_load(material, s.frame.view.z, tangent_turn(s.frame, tangent_decode(normal.xyz, normal.w)),
+            factors_unpack(texelFetch(factors, p, 0)));
+        s.lobes = lobes_load(p, s.frame, s.material);
+        found = missed_by(s, approximation_load(s.material, s.lobes, s.frame.view), start);
+    }
+    return found;
 }
 
 void main() {

@@ -19,6 +19,7 @@ use crate::pass::environment::EnvironmentImages;
 use crate::pass::gbuffer;
 use crate::pass::materials::{MaterialBridge, MaterialImages};
 use crate::pass::object_cells::ObjectCells;
+use crate::pass::surfaces::Surfaces;
 use crate::pass::{
     FrameUniform, allocate, bandwidth, base, classify, curvature, filter, level, luminance, pyramid, residual_level, resolve,
     shade, shading_rate, texture_space, tonemap, upsample, vmf_mips,
@@ -210,6 +211,9 @@ impl Renderer {
             }
         };
 
+        let light_count = exact + area;
+        let surfaces = Surfaces { frame, bridge, samplers, normals, factors, lobes, materials, lights, light_count, shadows };
+
         // 4  The level of every sample: predicted, by the frame before, the same, or the host's.
         let shading = targets.plan.shading;
         let analysed = environment.bandwidth.as_ref().zip(materials.bandwidths.as_ref());
@@ -220,19 +224,10 @@ impl Renderer {
                 pass.record(
                     rec,
                     &bandwidth::Io {
-                        frame,
-                        bridge,
-                        samplers,
+                        surfaces,
                         environment,
                         environment_bandwidth,
-                        materials,
                         material_bandwidths,
-                        normals,
-                        factors,
-                        lobes,
-                        lights,
-                        light_count: exact + area,
-                        shadows,
                         dark: (DARK * environment.mean * f64::from(inputs.environment.intensity)) as f32,
                         level,
                         prediction,
@@ -243,23 +238,7 @@ impl Renderer {
                 Some(level.view)
             }
             (Some(level), _) if let (Some(pass), Some(fits)) = (&of_kinds.residual_level, &materials.fits) => {
-                let area_lights = area > 0;
-                pass.record(
-                    rec,
-                    &residual_level::Io {
-                        frame,
-                        bridge,
-                        samplers,
-                        normals,
-                        factors,
-                        lobes,
-                        materials,
-                        fits,
-                        area_lights,
-                        shadows,
-                        level,
-                    },
-                );
+                pass.record(rec, &residual_level::Io { surfaces, fits, area_lights: area > 0, level });
                 rec.image(level, Access::COMPUTE_SAMPLED);
                 Some(level.view)
             }
@@ -320,26 +299,9 @@ impl Renderer {
         }
 
         // 7  Radiance of all, from pre-convolved light.
-        let (radiance, light_count) = (&targets.radiance, exact + area);
+        let radiance = &targets.radiance;
         if let (Some(pass), Some(prefiltered), Some(fits)) = (&of_kinds.base, &environment.prefiltered, &materials.fits) {
-            pass.record(
-                rec,
-                &base::Io {
-                    frame,
-                    bridge,
-                    samplers,
-                    normals,
-                    factors,
-                    lobes,
-                    prefiltered,
-                    materials,
-                    fits,
-                    lights,
-                    light_count,
-                    shadows,
-                    radiance: targets.base.as_ref().unwrap_or(radiance),
-                },
-            );
+            pass.record(rec, &base::Io { surfaces, prefiltered, fits, radiance: targets.base.as_ref().unwrap_or(radiance) });
         }
 
         // 8  Radiance of the samples to shade, or what the base leaves of it.
@@ -350,19 +312,10 @@ impl Renderer {
             pass.record(
                 rec,
                 &shade::Io {
-                    frame,
-                    bridge,
-                    samplers,
-                    normals,
-                    factors,
-                    lobes,
+                    surfaces,
                     environment,
-                    materials,
                     arguments,
                     list: to_shade,
-                    lights,
-                    light_count,
-                    shadows,
                     directions,
                     residual,
                     radiance,

@@ -135,24 +135,41 @@ fn container(fields: &[Entry]) -> Vec<u8> {
     bytes
 }
 
+/// How finely a file is written.
+struct Fineness {
+    /// Incidences: azimuths of a part of the circle, polar angles.
+    phi: usize,
+    theta: usize,
+    /// Sides of the visible normals and of the colours.
+    warp: usize,
+    rgb: usize,
+    /// Azimuths and polar angles of normals, and polar angles of projected areas.
+    turns: usize,
+    ndf: usize,
+    sigma: usize,
+}
+
+/// To compare with what is written.
+const FINE: Fineness = Fineness { phi: 9, theta: 16, warp: 64, rgb: 32, turns: 129, ndf: 512, sigma: 256 };
+/// To keep.
+const SMALL: Fineness = Fineness { phi: 5, theta: 8, warp: 24, rgb: 8, turns: 33, ndf: 128, sigma: 64 };
+
 /// The file of `material` with incidences over 1/`parts` of the circle; isotropic for 0.
-fn synthesise(material: &Analytic, parts: usize) -> Vec<u8> {
-    const THETA: usize = 16;
-    const WARP: usize = 64;
-    const RGB: usize = 32;
+fn synthesise(material: &Analytic, parts: usize, fineness: &Fineness) -> Vec<u8> {
+    let Fineness { phi: azimuths, theta: angles, warp, rgb: side, .. } = *fineness;
+    let unit = |i: usize, n: usize| i as f64 / (n - 1) as f64;
     let phi: Vec<f64> = match parts {
         0 => vec![0.0],
-        parts => (0..9).map(|i| -PI + TAU / parts as f64 * f64::from(i) / 8.0).collect(),
+        parts => (0..azimuths).map(|i| -PI + TAU / parts as f64 * unit(i, azimuths)).collect(),
     };
-    let theta: Vec<f64> = (0..THETA).map(|i| 1.53 * (i as f64 / (THETA - 1) as f64)).collect();
-    let unit = |i: usize, n: usize| i as f64 / (n - 1) as f64;
+    let theta: Vec<f64> = (0..angles).map(|i| 1.53 * unit(i, angles)).collect();
     let plane = |size: [usize; 2], f: &dyn Fn(DVec3) -> f64| -> Vec<f64> {
         (0..size[0] * size[1]).map(|i| f(direction(unit(i % size[1], size[1]), unit(i / size[1], size[0])))).collect()
     };
-    let turns = if parts == 0 { 2 } else { 129 };
-    let ndf = plane([turns, 512], &|m| material.ndf(m));
+    let turns = if parts == 0 { 2 } else { fineness.turns };
+    let ndf = plane([turns, fineness.ndf], &|m| material.ndf(m));
     // Projected area: cosine over masking, whose limit at the horizon is half the slope's deviation.
-    let sigma = plane([turns, 256], &|w| {
+    let sigma = plane([turns, fineness.sigma], &|w| {
         let w = if w.z < 1e-6 { DVec3::new(w.x, w.y, 1e-6) } else { w };
         w.z / material.masking(w)
     });
@@ -160,16 +177,16 @@ fn synthesise(material: &Analytic, parts: usize) -> Vec<u8> {
     for &phi in &phi {
         for &theta in &theta {
             let i = DVec3::new(theta.sin() * phi.cos(), theta.sin() * phi.sin(), theta.cos());
-            let density: Vec<f64> = (0..WARP * WARP)
+            let density: Vec<f64> = (0..warp * warp)
                 .map(|k| {
-                    let (u, v) = (unit(k % WARP, WARP), unit(k / WARP, WARP));
+                    let (u, v) = (unit(k % warp, warp), unit(k / warp, warp));
                     let m = direction(u, v);
                     material.ndf(m) * i.dot(m).max(0.0) * u * m.z.acos().sin() + 1e-6
                 })
                 .collect();
             let mut planes = [Vec::new(), Vec::new(), Vec::new()];
-            for k in 0..RGB * RGB {
-                let [u, v] = forward(&density, WARP, [unit(k % RGB, RGB), unit(k / RGB, RGB)]);
+            for k in 0..side * side {
+                let [u, v] = forward(&density, warp, [unit(k % side, side), unit(k / side, side)]);
                 let m = direction(u, v);
                 let o = 2.0 * i.dot(m) * m - i;
                 let rest = material.fresnel(i.dot(m)) * if o.z > 0.0 { material.masking(o) } else { 0.0 };
@@ -182,13 +199,13 @@ fn synthesise(material: &Analytic, parts: usize) -> Vec<u8> {
     container(&[
         ("description", 1, vec![9], b"synthetic".to_vec()),
         ("jacobian", 1, vec![1], vec![1]),
-        floats("luminance", &[phi.len(), THETA, 2, 2], &vec![1.0; phi.len() * THETA * 4]),
-        floats("ndf", &[turns, 512], &ndf),
+        floats("luminance", &[phi.len(), angles, 2, 2], &vec![1.0; phi.len() * angles * 4]),
+        floats("ndf", &[turns, fineness.ndf], &ndf),
         floats("phi_i", &[phi.len()], &phi),
-        floats("rgb", &[phi.len(), THETA, 3, RGB, RGB], &rgb),
-        floats("sigma", &[turns, 256], &sigma),
-        floats("theta_i", &[THETA], &theta),
-        floats("vndf", &[phi.len(), THETA, WARP, WARP], &vndf),
+        floats("rgb", &[phi.len(), angles, 3, side, side], &rgb),
+        floats("sigma", &[turns, fineness.sigma], &sigma),
+        floats("theta_i", &[angles], &theta),
+        floats("vndf", &[phi.len(), angles, warp, warp], &vndf),
     ])
 }
 
@@ -201,7 +218,7 @@ fn materials() -> [(Analytic, usize); 4] {
 #[test]
 fn a_synthesised_file_reproduces_the_material_that_it_stands_for() {
     for (material, parts) in materials() {
-        let rgl = Rgl::from_bytes(&synthesise(&material, parts)).unwrap();
+        let rgl = Rgl::from_bytes(&synthesise(&material, parts, &FINE)).unwrap();
         assert_eq!(rgl.isotropic(), parts == 0);
         let mut errors = Vec::new();
         for i in 0..20_000 {
@@ -225,11 +242,37 @@ fn a_synthesised_file_reproduces_the_material_that_it_stands_for() {
     }
 }
 
+/// What `passband bench --suite residual` has of this format. Written anew with `PASSBAND_BLESS=1`.
+#[test]
+fn the_stand_ins_of_the_bench_are_what_is_synthesised() {
+    let satin = Analytic { alpha: DVec2::splat(0.3), f0: DVec3::new(0.55, 0.4, 0.3) };
+    let brushed = Analytic { alpha: DVec2::new(0.4, 0.15), f0: DVec3::new(0.9, 0.85, 0.75) };
+    for (name, material, parts) in [("satin.bsdf", satin, 0), ("brushed.bsdf", brushed, 4)] {
+        let written = synthesise(&material, parts, &SMALL);
+        if std::env::var_os("PASSBAND_BLESS").is_some() {
+            std::fs::write(data(name), &written).unwrap();
+        }
+        let [kept, expected] = [bytes(name), written].map(|file| Rgl::from_bytes(&file).unwrap());
+        assert_eq!(kept.isotropic(), parts == 0);
+        let error = bake::error(&material, &kept, 20_000);
+        println!("{name}: {} bytes, {error:?}", bytes(name).len());
+        assert!(bytes(name).len() < 200_000 && error.rms < 0.1, "{name}: {error:?}");
+        for i in 0..1000 {
+            let [a, b] = sobol::random(i, 75).map(sobol::to_unit);
+            let [c, d] = sobol::random(i, 76).map(sobol::to_unit);
+            let (wi, wo) = (direction(0.9 * a, b), direction(0.9 * c, d));
+            let (f, g) = (kept.evaluate(wi, wo), expected.evaluate(wi, wo));
+            // Sines of another library may differ in the last bit.
+            assert!((f - g).abs().max_element() <= 1e-3 * g.max_element(), "{name}: {f} for {g}");
+        }
+    }
+}
+
 #[test]
 fn the_albedo_is_the_analytic_one() {
     // An integral over light, so that a warp that keeps values but moves them would show.
     for (material, parts) in materials() {
-        let rgl = Rgl::from_bytes(&synthesise(&material, parts)).unwrap();
+        let rgl = Rgl::from_bytes(&synthesise(&material, parts, &FINE)).unwrap();
         let view = DVec3::new(0.5, -0.3, 0.8).normalize();
         let albedo = |f: &dyn Reflectance| {
             let mut sum = DVec3::ZERO;
@@ -259,7 +302,7 @@ fn baked_tables_are_close_and_reciprocal() {
         if parts == 1 || parts == 2 {
             continue;
         }
-        let rgl = Rgl::from_bytes(&synthesise(&material, parts)).unwrap();
+        let rgl = Rgl::from_bytes(&synthesise(&material, parts, &FINE)).unwrap();
         let clock = std::time::Instant::now();
         let baked: Box<dyn Reflectance> = if parts == 0 { Box::new(rgl.bake()) } else { Box::new(rgl.bake_turned().unwrap()) };
         let seconds = clock.elapsed().as_secs_f64();

@@ -10,14 +10,13 @@ use crate::gpu::access::Access;
 use crate::gpu::buffer::Buffer;
 use crate::gpu::image::{Image, ImageDesc};
 use crate::gpu::memory::Location;
-use crate::gpu::pipeline::{BridgeSets, ComputePipeline, Interface, Resource};
+use crate::gpu::pipeline::{ComputePipeline, Interface, Resource};
 use crate::gpu::recorder::Recorder;
 use crate::gpu::retire::{Build, Retired};
-use crate::gpu::sampler::Samplers;
 use crate::kinds::Kinds;
 use crate::pass::environment::EnvironmentImages;
-use crate::pass::materials::{Bandwidths, MaterialImages};
-use crate::pass::shade::lobe_constants;
+use crate::pass::materials::Bandwidths;
+use crate::pass::surfaces::{Surfaces, lobe_constants};
 use crate::pass::{PassContext, classify, level, pyramid};
 use ash::vk::{self, DescriptorType as D};
 use bytemuck::{Pod, Zeroable};
@@ -133,24 +132,12 @@ impl Prediction {
 }
 
 pub(crate) struct Io<'a> {
-    pub frame: &'a Buffer,
-    pub bridge: BridgeSets,
-    pub samplers: &'a Samplers,
+    pub surfaces: Surfaces<'a>,
     pub environment: &'a EnvironmentImages,
     /// Its bandwidth in cycles/radian.
     pub environment_bandwidth: &'a Image,
-    pub materials: &'a MaterialImages,
-    /// How fast their lobes and textures vary.
+    /// How fast lobes of materials and textures vary.
     pub material_bandwidths: &'a Bandwidths,
-    /// Of the `filter` pass.
-    pub normals: &'a Image,
-    pub factors: &'a Image,
-    pub lobes: &'a Image,
-    /// Exact lights first.
-    pub lights: &'a Buffer,
-    pub light_count: u32,
-    /// Masks of them, in an array.
-    pub shadows: vk::ImageView,
     /// Out: the level of each sample, in levels over a sample; 0 where all samples are shaded.
     pub level: &'a Image,
     /// Radiance that is added to the mean where directions are shared out by relative deviation.
@@ -206,15 +193,13 @@ impl Bandwidth {
 
     pub fn record(&self, rec: &mut Recorder<'_>, io: &Io<'_>) {
         let Prediction { image: prediction, forecast, blocks } = io.prediction;
+        let s = &io.surfaces;
         rec.begin(NAME);
         io.environment.sampled(rec);
-        io.materials.sampled(rec);
+        s.sampled(rec);
         rec.image(io.environment_bandwidth, Access::COMPUTE_SAMPLED);
         rec.image(&io.material_bandwidths.lobes, Access::COMPUTE_SAMPLED);
         rec.buffer(&io.material_bandwidths.textures, Access::COMPUTE_READ);
-        rec.image(io.normals, Access::COMPUTE_SAMPLED);
-        rec.image(io.factors, Access::COMPUTE_SAMPLED);
-        rec.image(io.lobes, Access::COMPUTE_SAMPLED);
         level::clear(rec, io.level, 0);
         level::clear(rec, prediction, 0);
         rec.image(io.level, Access::COMPUTE_WRITE);
@@ -235,8 +220,8 @@ impl Bandwidth {
         rec.buffer(blocks, Access::COMPUTE_WRITE);
         rec.flush();
         let all = first_blocks(prediction.extent());
-        let found = [Resource::Uniform(io.frame), Resource::Buffer(forecast), Resource::Buffer(blocks)];
-        self.blocks.bind(rec, io.bridge, &found, &BlocksPush { side: self.push.side, stride: STRIDE as i32, all });
+        let found = [Resource::Uniform(s.frame), Resource::Buffer(forecast), Resource::Buffer(blocks)];
+        self.blocks.bind(rec, s.bridge, &found, &BlocksPush { side: self.push.side, stride: STRIDE as i32, all });
         self.blocks.dispatch(rec, prediction.extent());
         rec.buffer(forecast, Access::INDIRECT);
         rec.flush();
@@ -244,25 +229,25 @@ impl Bandwidth {
         rec.buffer(blocks, Access::COMPUTE_READ);
         rec.flush();
         let resources = [
-            Resource::Uniform(io.frame),
-            Resource::Sampled(&io.environment.map, io.samplers.linear),
-            Resource::Sampled(&io.environment.alias, io.samplers.nearest),
-            Resource::Sampled(io.normals, io.samplers.nearest),
-            Resource::Sampled(io.factors, io.samplers.nearest),
-            Resource::Sampled(io.environment_bandwidth, io.samplers.nearest),
-            Resource::Sampled(&io.material_bandwidths.lobes, io.samplers.nearest),
+            Resource::Uniform(s.frame),
+            Resource::Sampled(&io.environment.map, s.samplers.linear),
+            Resource::Sampled(&io.environment.alias, s.samplers.nearest),
+            Resource::Sampled(s.normals, s.samplers.nearest),
+            Resource::Sampled(s.factors, s.samplers.nearest),
+            Resource::Sampled(io.environment_bandwidth, s.samplers.nearest),
+            Resource::Sampled(&io.material_bandwidths.lobes, s.samplers.nearest),
             Resource::Storage(io.level.view),
             Resource::Storage(prediction.view),
-            Resource::Buffer(io.lights),
+            Resource::Buffer(s.lights),
             Resource::Buffer(forecast),
             Resource::Buffer(blocks),
             Resource::Buffer(&io.material_bandwidths.textures),
-            Resource::View(io.shadows, io.samplers.nearest),
-            Resource::Sampled(io.lobes, io.samplers.nearest),
+            Resource::View(s.shadows, s.samplers.nearest),
+            Resource::Sampled(s.lobes, s.samplers.nearest),
         ];
-        let pipeline = &self.pipelines[usize::from(io.light_count > 0)];
+        let pipeline = &self.pipelines[usize::from(s.light_count > 0)];
         let push = Push { all, dark: io.dark, ..self.push };
-        pipeline.bind(rec, io.bridge, &resources, &Push { early: 1, ..push });
+        pipeline.bind(rec, s.bridge, &resources, &Push { early: 1, ..push });
         pipeline.dispatch_indirect(rec, forecast, OF_FIRST);
         // Where many samples are to be shaded, nothing follows: finding the others would take longer than they do.
         rec.buffer(forecast, Access::INDIRECT);

@@ -6,16 +6,15 @@ use crate::error::{Error, Result};
 use crate::gpu::access::Access;
 use crate::gpu::buffer::Buffer;
 use crate::gpu::image::Image;
-use crate::gpu::pipeline::{BridgeSets, ComputePipeline, Interface, Resource};
+use crate::gpu::pipeline::{ComputePipeline, Interface, Resource};
 use crate::gpu::recorder::Recorder;
 use crate::gpu::retire::Retired;
-use crate::gpu::sampler::Samplers;
 use crate::kinds::Kinds;
 use crate::light::Light;
-use crate::pass::materials::MaterialImages;
+use crate::pass::PassContext;
 use crate::pass::prefilter::Prefiltered;
-use crate::pass::{PassContext, shade};
-use ash::vk::{self, DescriptorType as D};
+use crate::pass::surfaces::{Surfaces, lobe_constants};
+use ash::vk::DescriptorType as D;
 
 /// Pass, shader, label, timer and AOV name.
 pub const NAME: &str = "base";
@@ -44,21 +43,10 @@ pub const INTERFACE: Interface = Interface {
 };
 
 pub(crate) struct Io<'a> {
-    pub frame: &'a Buffer,
-    pub bridge: BridgeSets,
-    pub samplers: &'a Samplers,
-    /// Of the `filter` pass.
-    pub normals: &'a Image,
-    pub factors: &'a Image,
-    pub lobes: &'a Image,
+    /// Of which lights are exact ones, as [`check_lights`] says.
+    pub surfaces: Surfaces<'a>,
     pub prefiltered: &'a Prefiltered,
-    pub materials: &'a MaterialImages,
     pub fits: &'a Buffer,
-    /// Exact ones, as [`check_lights`] says.
-    pub lights: &'a Buffer,
-    pub light_count: u32,
-    /// Masks of them, in an array.
-    pub shadows: vk::ImageView,
     /// Out: linear radiance where covered.
     pub radiance: &'a Image,
 }
@@ -82,7 +70,7 @@ impl Base {
             let own = [u32::from(config.widened()), lights, suns, 0, 0, 0];
             let constants: Vec<_> = own
                 .into_iter()
-                .chain(shade::lobe_constants(config, kinds))
+                .chain(lobe_constants(config, kinds))
                 .chain([u32::from(config.exact_lobes), kinds.models])
                 .collect();
             ComputePipeline::new(p.build, p.modules, &INTERFACE, p.bridge, p.slots, &constants)
@@ -91,33 +79,31 @@ impl Base {
     }
 
     pub fn record(&self, rec: &mut Recorder<'_>, io: &Io<'_>) {
+        let s = &io.surfaces;
         rec.begin(NAME);
         io.prefiltered.sampled(rec);
-        io.materials.sampled(rec);
-        rec.image(io.normals, Access::COMPUTE_SAMPLED);
-        rec.image(io.factors, Access::COMPUTE_SAMPLED);
-        rec.image(io.lobes, Access::COMPUTE_SAMPLED);
+        s.sampled(rec);
         rec.buffer(io.fits, Access::COMPUTE_READ);
         rec.overwrite(io.radiance, Access::COMPUTE_WRITE);
         rec.flush();
-        let [first, second, irradiance, suns] = io.prefiltered.resources(io.samplers);
+        let [first, second, irradiance, suns] = io.prefiltered.resources(s.samplers);
         let resources = [
-            Resource::Uniform(io.frame),
-            Resource::Sampled(io.normals, io.samplers.nearest),
-            Resource::Sampled(io.factors, io.samplers.nearest),
-            Resource::Buffer(io.lights),
+            Resource::Uniform(s.frame),
+            Resource::Sampled(s.normals, s.samplers.nearest),
+            Resource::Sampled(s.factors, s.samplers.nearest),
+            Resource::Buffer(s.lights),
             Resource::Storage(io.radiance.view),
             first,
             second,
             irradiance,
             suns,
-            Resource::Sampled(io.lobes, io.samplers.nearest),
+            Resource::Sampled(s.lobes, s.samplers.nearest),
             Resource::Buffer(io.fits),
-            Resource::View(io.shadows, io.samplers.nearest),
+            Resource::View(s.shadows, s.samplers.nearest),
         ];
-        let pipeline = &self.0[if io.light_count > 0 { 2 } else { usize::from(io.prefiltered.has_suns) }];
-        pipeline.bind(rec, io.bridge, &resources, &());
-        pipeline.dispatch(rec, io.normals.extent());
+        let pipeline = &self.0[if s.light_count > 0 { 2 } else { usize::from(io.prefiltered.has_suns) }];
+        pipeline.bind(rec, s.bridge, &resources, &());
+        pipeline.dispatch(rec, s.normals.extent());
         rec.end();
     }
 

@@ -31,6 +31,8 @@ pub mod residual_level;
 pub mod resolve;
 pub mod shade;
 pub mod shading_rate;
+pub(crate) mod suns;
+pub(crate) mod surfaces;
 pub mod texture_space;
 pub mod tonemap;
 pub mod upsample;

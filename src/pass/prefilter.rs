@@ -5,8 +5,7 @@
 //! level gathers the light under its lobe from the grid whose texels are half of its standard deviation or less, and none from
 //! another level, so that no error adds up. All of it lies in one buffer, which is copied into an image with mips at the end.
 
-use crate::distribution::prefilter::{Chain, SOURCE_WIDTH, STEPS_TO_MAP};
-use crate::distribution::suns::{MAX_POINTS, MAX_SUNS, Suns};
+use crate::distribution::prefilter::{Chain, SOURCE_WIDTH};
 use crate::error::Result;
 use crate::gpu::access::Access;
 use crate::gpu::buffer::Buffer;
@@ -18,10 +17,10 @@ use crate::gpu::retire::{Build, Retired};
 use crate::gpu::sampler::Samplers;
 use crate::gpu::upload::BufferUpload;
 use crate::pass::PassContext;
-use crate::sampling::{LatLong, latlong};
+use crate::pass::suns::SunList;
+use crate::sampling::LatLong;
 use ash::vk::{self, DescriptorType as D};
 use bytemuck::{Pod, Zeroable};
-use glam::DVec3;
 
 /// Pass, label and timer name.
 pub const NAME: &str = "prefilter";
@@ -62,62 +61,6 @@ struct ConvolvePush {
     from: i32,
     kappa: f32,
     blurred: f32,
-}
-
-/// Mirrors `SunList` in `glsl/include/suns.glsl`.
-#[repr(C)]
-#[derive(Clone, Copy, Pod, Zeroable)]
-struct SunList {
-    scale: [f32; 4],
-    rule: [f32; 4],
-    count: [i32; 4],
-    all: [SunRecord; MAX_SUNS],
-    points: [SunPoint; MAX_SUNS * MAX_POINTS],
-}
-
-#[repr(C)]
-#[derive(Clone, Copy, Pod, Zeroable)]
-struct SunRecord {
-    place: [f32; 4],
-    irradiance: [f32; 4],
-    texels: [i32; 4],
-    points: [u32; 4],
-}
-
-#[repr(C)]
-#[derive(Clone, Copy, Pod, Zeroable)]
-struct SunPoint {
-    place: [f32; 4],
-    irradiance: [f32; 4],
-}
-
-impl SunList {
-    fn of(map: &LatLong, chain: Chain) -> Self {
-        let Suns { suns, bright, kept } = Suns::of(map);
-        let mut list = Self {
-            scale: [(0.5 / chain.kappa(1)) as f32, (2 * chain.levels() - 3) as f32, (1.0 / STEPS_TO_MAP) as f32, 0.0],
-            rule: [bright, kept, 0.0, 0.0],
-            count: [suns.len() as i32, 0, 0, 0],
-            ..Self::zeroed()
-        };
-        let place = |direction, z: f64| latlong::uv(direction).extend(z).extend(0.0).as_vec4().to_array();
-        let rgb = |irradiance: DVec3| irradiance.extend(0.0).as_vec4().to_array();
-        let mut points = Vec::new();
-        for (record, sun) in list.all.iter_mut().zip(&suns) {
-            let [x0, x1, y0, y1] = sun.texels;
-            let distance = 2.0 * (0.5 * sun.radius).sin();
-            *record = SunRecord {
-                place: place(sun.direction, distance * distance),
-                irradiance: rgb(sun.irradiance),
-                texels: [x0.rem_euclid(map.width() as i32), x1 - x0, y0, y1],
-                points: [points.len() as u32, sun.points.len() as u32, 0, 0],
-            };
-            let part = |&[at, taken]: &[DVec3; 2]| SunPoint { place: place(at, 0.0), irradiance: rgb(taken) };
-            points.extend(sun.points.iter().map(part));
-        }
-        list.points[..points.len()].copy_from_slice(&points);
-        list
-    }
 }
 
 /// Columns of the irradiance, which is as smooth as a lobe of concentration 1.
@@ -228,7 +171,7 @@ impl Prefilter {
         ];
         let storage = vk::BufferUsageFlags::STORAGE_BUFFER;
         let list = SunList::of(map, chain);
-        let has_suns = list.count[0] > 0;
+        let has_suns = list.has_suns();
         let suns = BufferUpload::new(build, "suns", storage, bytemuck::bytes_of(&list))?;
         let mut buffer = |name, texels, usage| Buffer::new(build, name, texels * TEXEL, usage, Location::Device);
         let [.., end] = starts(chain);

@@ -6,15 +6,13 @@ use crate::error::Result;
 use crate::gpu::access::Access;
 use crate::gpu::buffer::Buffer;
 use crate::gpu::image::Image;
-use crate::gpu::pipeline::{BridgeSets, ComputePipeline, Interface, Resource};
+use crate::gpu::pipeline::{ComputePipeline, Interface, Resource};
 use crate::gpu::recorder::Recorder;
 use crate::gpu::retire::Retired;
-use crate::gpu::sampler::Samplers;
 use crate::kinds::Kinds;
 use crate::pass::PassContext;
-use crate::pass::materials::MaterialImages;
-use crate::pass::shade::lobe_constants;
-use ash::vk::{self, DescriptorType as D};
+use crate::pass::surfaces::{Surfaces, lobe_constants};
+use ash::vk::DescriptorType as D;
 use bytemuck::{Pod, Zeroable};
 
 /// Pass, shader, label and timer name.
@@ -48,19 +46,10 @@ struct Push {
 }
 
 pub(crate) struct Io<'a> {
-    pub frame: &'a Buffer,
-    pub bridge: BridgeSets,
-    pub samplers: &'a Samplers,
-    /// Of the `filter` pass.
-    pub normals: &'a Image,
-    pub factors: &'a Image,
-    pub lobes: &'a Image,
-    pub materials: &'a MaterialImages,
+    pub surfaces: Surfaces<'a>,
     pub fits: &'a Buffer,
     /// Whether residuals hold area lights, of which fits know nothing: then each sample is shaded for itself.
     pub area_lights: bool,
-    /// Masks of lights, in an array.
-    pub shadows: vk::ImageView,
     /// Out: the level of each sample, in levels over a sample.
     pub level: &'a Image,
 }
@@ -79,23 +68,23 @@ impl ResidualLevel {
     }
 
     pub fn record(&self, rec: &mut Recorder<'_>, io: &Io<'_>) {
+        let s = &io.surfaces;
         rec.begin(NAME);
-        io.materials.sampled(rec);
-        [io.normals, io.factors, io.lobes].into_iter().for_each(|image| rec.image(image, Access::COMPUTE_SAMPLED));
+        s.sampled(rec);
         rec.buffer(io.fits, Access::COMPUTE_READ);
         rec.overwrite(io.level, Access::COMPUTE_WRITE);
         rec.flush();
         let resources = [
-            Resource::Uniform(io.frame),
-            Resource::Sampled(io.normals, io.samplers.nearest),
+            Resource::Uniform(s.frame),
+            Resource::Sampled(s.normals, s.samplers.nearest),
             Resource::Buffer(io.fits),
             Resource::Storage(io.level.view),
-            Resource::View(io.shadows, io.samplers.nearest),
-            Resource::Sampled(io.factors, io.samplers.nearest),
-            Resource::Sampled(io.lobes, io.samplers.nearest),
+            Resource::View(s.shadows, s.samplers.nearest),
+            Resource::Sampled(s.factors, s.samplers.nearest),
+            Resource::Sampled(s.lobes, s.samplers.nearest),
         ];
         let errors = if io.area_lights { [-1.0; 2] } else { self.1.errors };
-        self.0.bind(rec, io.bridge, &resources, &Push { errors, ..self.1 });
+        self.0.bind(rec, s.bridge, &resources, &Push { errors, ..self.1 });
         // 2x2 samples each.
         self.0.dispatch(rec, io.level.extent().map(|e| e.div_ceil(2)));
         rec.end();

@@ -1,23 +1,21 @@
 //! Pass 8: reflected radiance of the listed samples (Bagher 2011, equations 1 and 2, section 3.3).
 
 use crate::config::{Config, Estimator};
-use crate::distribution::Filter;
 use crate::error::Result;
 use crate::frequency::allocation::Allocation;
 use crate::gpu::access::Access;
 use crate::gpu::buffer::Buffer;
 use crate::gpu::image::Image;
-use crate::gpu::pipeline::{BridgeSets, ComputePipeline, Interface, Resource};
+use crate::gpu::pipeline::{ComputePipeline, Interface, Resource};
 use crate::gpu::recorder::Recorder;
 use crate::gpu::retire::Retired;
-use crate::gpu::sampler::Samplers;
 use crate::kinds::Kinds;
 use crate::light::Light;
 use crate::pass::PassContext;
 use crate::pass::environment::EnvironmentImages;
-use crate::pass::materials::MaterialImages;
+use crate::pass::surfaces::{Surfaces, lobe_constants};
 use crate::plan::Directions;
-use ash::vk::{self, DescriptorType as D};
+use ash::vk::DescriptorType as D;
 use bytemuck::{Pod, Zeroable};
 
 /// Pass, shader, label and timer name.
@@ -61,23 +59,11 @@ struct Push {
 }
 
 pub(crate) struct Io<'a> {
-    pub frame: &'a Buffer,
-    pub bridge: BridgeSets,
-    pub samplers: &'a Samplers,
-    /// Of the `filter` pass.
-    pub normals: &'a Image,
-    pub factors: &'a Image,
-    pub lobes: &'a Image,
+    pub surfaces: Surfaces<'a>,
     pub environment: &'a EnvironmentImages,
-    pub materials: &'a MaterialImages,
     pub arguments: &'a Buffer,
     /// Of `classify`, or of `allocate` where samples have numbers of directions of their own.
     pub list: &'a Buffer,
-    /// Exact lights first.
-    pub lights: &'a Buffer,
-    pub light_count: u32,
-    /// Masks of them, in an array.
-    pub shadows: vk::ImageView,
     pub directions: Directions,
     pub residual: Option<Residual<'a>>,
     /// Out: linear radiance where listed.
@@ -103,19 +89,6 @@ pub(crate) struct Shade {
     pipelines: [ComputePipeline; 2],
     /// Error of a fit up to which nothing is estimated.
     negligible: f32,
-}
-
-/// Constants of `glsl/include/lobes.glsl` and `approximation.glsl`, and whether there are materials whose lobes the filter does not
-/// find.
-pub(crate) fn lobe_constants(config: &Config, kinds: Kinds) -> [u32; 8] {
-    let layers = config.filter.lobe_layers();
-    let slopes = config.filter.has_slopes();
-    let smith = config.filter == Filter::Leadr;
-    let elliptic = u32::from(config.filter.is_elliptic()) + u32::from(kinds.coloured);
-    let of_kinds = [kinds.unfiltered, kinds.fitted, kinds.reflected].map(u32::from);
-    let of_filter = [layers > 0, slopes, smith].map(u32::from);
-    let ([lobed, slopes, smith], [unfiltered, fitted, reflected]) = (of_filter, of_kinds);
-    [layers.max(1), lobed, slopes, smith, unfiltered, elliptic, fitted, reflected]
 }
 
 /// What is added on both sides of a factor on light that is looked up, so that factors stay small where there is little of it beside
@@ -159,12 +132,10 @@ impl Shade {
     }
 
     pub fn record(&self, rec: &mut Recorder<'_>, io: &Io<'_>) {
+        let s = &io.surfaces;
         rec.begin(NAME);
         io.environment.sampled(rec);
-        io.materials.sampled(rec);
-        rec.image(io.normals, Access::COMPUTE_SAMPLED);
-        rec.image(io.factors, Access::COMPUTE_SAMPLED);
-        rec.image(io.lobes, Access::COMPUTE_SAMPLED);
+        s.sampled(rec);
         rec.buffer(io.arguments, Access::INDIRECT);
         rec.buffer(io.arguments, Access::COMPUTE_READ);
         rec.buffer(io.list, Access::COMPUTE_READ);
@@ -178,22 +149,22 @@ impl Shade {
         }
         rec.flush();
         let resources = [
-            Resource::Uniform(io.frame),
-            Resource::Sampled(io.environment.drawn(), io.samplers.linear),
-            Resource::Sampled(&io.environment.alias, io.samplers.nearest),
+            Resource::Uniform(s.frame),
+            Resource::Sampled(io.environment.drawn(), s.samplers.linear),
+            Resource::Sampled(&io.environment.alias, s.samplers.nearest),
             Resource::Buffer(io.arguments),
             Resource::Buffer(io.list),
             Resource::Storage(io.radiance.view),
-            Resource::Buffer(io.lights),
+            Resource::Buffer(s.lights),
             Resource::Storage(io.odd.unwrap_or(io.radiance).view),
-            Resource::Sampled(io.normals, io.samplers.nearest),
-            Resource::Sampled(io.factors, io.samplers.nearest),
-            Resource::Sampled(io.lobes, io.samplers.nearest),
+            Resource::Sampled(s.normals, s.samplers.nearest),
+            Resource::Sampled(s.factors, s.samplers.nearest),
+            Resource::Sampled(s.lobes, s.samplers.nearest),
             // Bound to something where there are none.
-            Resource::Buffer(io.residual.map_or(io.lights, |r| r.fits)),
-            Resource::Sampled(io.residual.map_or(io.normals, |r| r.base), io.samplers.nearest),
-            Resource::Buffer(io.residual.map_or(io.lights, |r| r.suns)),
-            Resource::View(io.shadows, io.samplers.nearest),
+            Resource::Buffer(io.residual.map_or(s.lights, |r| r.fits)),
+            Resource::Sampled(io.residual.map_or(s.normals, |r| r.base), s.samplers.nearest),
+            Resource::Buffer(io.residual.map_or(s.lights, |r| r.suns)),
+            Resource::View(s.shadows, s.samplers.nearest),
         ];
         let Directions { brdf, environment, light } = io.directions;
         let offset = io.residual.map_or(0.0, |r| r.offset);
@@ -205,8 +176,8 @@ impl Shade {
             // What area lights shine is in no fit.
             negligible: if light > 0 { -1.0 } else { self.negligible },
         };
-        let pipeline = &self.pipelines[usize::from(io.light_count > 0)];
-        pipeline.bind(rec, io.bridge, &resources, &push);
+        let pipeline = &self.pipelines[usize::from(s.light_count > 0)];
+        pipeline.bind(rec, s.bridge, &resources, &push);
         pipeline.dispatch_indirect(rec, io.arguments, 0);
         rec.end();
     }

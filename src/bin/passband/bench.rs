@@ -6,7 +6,7 @@ use clap::ValueEnum;
 use passband::Filter;
 use passband::offline::bench::figures::Figure;
 use passband::offline::bench::report::Report;
-use passband::offline::bench::{reference, suites, xu};
+use passband::offline::bench::{reference, suites, truths, xu};
 use passband::offline::error::{Error, Result};
 use passband::offline::headless::Options;
 use passband::offline::image_io::{check_writable, write_atomically};
@@ -131,7 +131,7 @@ impl Args {
             filters: if self.filters.is_empty() { suite.filters(self.preset()) } else { self.filters.clone() },
             device: self.options(),
             root: PathBuf::new(),
-            cache: xu::cache_folder(),
+            cache: truths::cache_folder(),
         })
     }
 
@@ -157,7 +157,7 @@ impl Args {
             scenes: self.scenes.clone(),
             device: self.options(),
             root: PathBuf::new(),
-            cache: if suite == suites::Suite::Joined { xu::cache_folder() } else { reference::cache_folder() },
+            cache: if suite == suites::Suite::Joined { truths::cache_folder() } else { reference::cache_folder() },
         })
     }
 

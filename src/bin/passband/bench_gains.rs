@@ -134,9 +134,8 @@ pub fn reached(lines: &[Reached]) -> String {
 /// Joined frames beside supersampling and each method alone.
 pub fn joined(lines: &[joined::Line]) -> String {
     let over = |over: &joined::Over| {
-        let by = over.variant.clone().unwrap_or_default();
         let [least, most] = over.interval;
-        [format!("{} [{least:.2}, {most:.2}]", bounded(over.speed_up.factor, over.speed_up.is)), by]
+        [format!("{} [{least:.2}, {most:.2}]", bounded(over.speed_up.factor, over.speed_up.is)), over.variant.clone()]
     };
     let row = |line: &joined::Line| {
         let own = [format!("{:.1}", line.ms), format!("{:.2}", line.psnr), format!("{:.1e}", line.relmse)];

@@ -32,8 +32,8 @@ pub enum Gloss {
 pub struct Case {
     /// A mesh, by the name that its scene has here.
     pub mesh: &'static str,
-    /// A built-in (synthetic) reflectance; `mirror`, GGX of alpha 0.01; `rgl-isotropic` or `rgl-anisotropic`, tables of random
-    /// numbers; or `several`, those of the scene.
+    /// A built-in (synthetic) reflectance; `mirror`, GGX of alpha 0.01; `rgl-satin` or `rgl-brushed`, synthetic tables in
+    /// RGL's format; or `several`, those of the scene.
     pub reflectance: &'static str,
     /// A built-in environment, or the stem of a fetched one.
     pub environment: &'static str,
@@ -56,9 +56,8 @@ const MESHES: [(&str, &str, &str, Option<[&str; 2]>); 7] = [
 const BUILTIN_ENVIRONMENTS: [&str; 2] = ["sun-sky", "studio"];
 /// Reflectances that are no built-in tables, as scene files have them.
 const MODELS: [(&str, &str); 1] = [("mirror", "{ ggx = { alpha = 0.01, f0 = [0.95, 0.85, 0.6], albedo = 0 } }")];
-/// Tables in RGL's format, of random numbers, isotropic and not; by their path from the repository's root.
-const RGL: [(&str, &str); 2] =
-    [("rgl-isotropic", "tests/data/rgl/isotropic.bsdf"), ("rgl-anisotropic", "tests/data/rgl/whole.bsdf")];
+/// Synthetic tables in RGL's format, isotropic and not (`tests/rgl.rs` writes them); by their path from the repository's root.
+const RGL: [(&str, &str); 2] = [("rgl-satin", "tests/data/rgl/satin.bsdf"), ("rgl-brushed", "tests/data/rgl/brushed.bsdf")];
 /// In the place of a reflectance, where a scene has several and keeps them.
 const SEVERAL: &str = "several";
 /// Where `scripts/fetch-assets` puts files, from the repository's root.
@@ -118,8 +117,8 @@ pub const RESIDUAL_JUDGED: [Case; 12] = [
     case("armadillo", "rough", "sun-sky"),
     case("torus-knot", "gloss-plastic", "forest"),
     case("bunny", "felt", "city"),
-    case("torus-knot", "rgl-isotropic", "sun-sky"),
-    case("bumpy-sphere", "rgl-anisotropic", "studio"),
+    case("torus-knot", "rgl-satin", "sun-sky"),
+    case("bumpy-sphere", "rgl-brushed", "studio"),
 ];
 
 /// Every case of both halves, or those of the quick preset.

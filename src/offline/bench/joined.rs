@@ -18,8 +18,6 @@ pub const SCENES: [(&str, bool); 7] = [
     ("tablecloth", false),
     ("waves", false),
 ];
-/// What names of variants begin with that are supersampled.
-pub const SUPERSAMPLED: &str = "supersampled";
 /// The filter that is joined with the rest, and that which filters nothing.
 const JOINED: &str = "clusters";
 const POINT: &str = "point";
@@ -53,15 +51,11 @@ pub struct Line {
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Over {
     /// The fastest that is as good; if none is, the slowest.
-    pub variant: Option<String>,
+    pub variant: String,
     /// If none is as good, at least what the slowest takes.
     pub speed_up: SpeedUp,
     /// 95 % interval over rounds.
     pub interval: [f64; 2],
-}
-
-fn setting<'a>(row: &'a Row, name: &str) -> &'a str {
-    row.settings.get(name).and_then(|v| v.as_str()).unwrap_or_default()
 }
 
 fn over<'a>(row: &Row, others: impl Iterator<Item = &'a Row>) -> Option<Over> {
@@ -76,38 +70,36 @@ fn over<'a>(row: &Row, others: impl Iterator<Item = &'a Row>) -> Option<Over> {
         None => (timed.iter().max_by(by_time)?, Is::AtLeast),
     };
     let speed_up = SpeedUp { factor: found.1.ratio, is };
-    Some(Over { variant: Some(found.0.name.clone()), speed_up, interval: found.1.interval })
+    Some(Over { variant: found.0.name.clone(), speed_up, interval: found.1.interval })
 }
 
 /// Whether its samples are chosen by prediction, or light is looked up.
 fn adapts(row: &Row) -> bool {
-    setting(row, "rate") == "bandwidth" || setting(row, "estimator") != "mis"
+    row.setting("rate") == "bandwidth" || row.setting("estimator") != "mis"
 }
 
 /// Whether it is one method alone: a filter at full rate; a predicted rate or light that is looked up, of points.
 fn is_alone(row: &Row) -> bool {
-    let points = setting(row, "filter") == POINT;
-    if points { adapts(row) } else { !adapts(row) && setting(row, "rate") == "full" }
+    let points = row.setting("filter") == POINT;
+    if points { adapts(row) } else { !adapts(row) && row.setting("rate") == "full" }
 }
 
 /// Lines of all joined variants: of the filter, at a predicted rate or with light looked up.
 pub fn lines(scenes: &[SceneReport]) -> Vec<Line> {
     let of_scene = |scene: &SceneReport| {
-        let rows = || scene.variants.iter().filter(|row| row.part == Part::Compared);
-        let supersampled = |row: &&Row| row.name.starts_with(SUPERSAMPLED);
-        let joined = rows().filter(|row| setting(row, "filter") == JOINED && adapts(row));
+        let rows = |part| scene.variants.iter().filter(move |row| row.part == part);
+        let joined = rows(Part::Compared).filter(|row| row.setting("filter") == JOINED && adapts(row));
         let line = |row: &Row| {
             let error = row.error.as_ref()?;
-            let alone = rows().filter(|other| !supersampled(other) && is_alone(other));
             Some(Line {
                 scene: scene.name.clone(),
                 variant: row.name.clone(),
-                estimator: setting(row, "estimator").into(),
+                estimator: row.setting("estimator").into(),
                 ms: row.frame_ms.median,
                 psnr: error.psnr,
                 relmse: error.relmse,
-                supersampling: over(row, rows().filter(supersampled))?,
-                alone: over(row, alone)?,
+                supersampling: over(row, rows(Part::Supersampled))?,
+                alone: over(row, rows(Part::Compared).filter(|other| is_alone(other)))?,
             })
         };
         joined.filter_map(line).collect::<Vec<_>>()
@@ -153,7 +145,7 @@ mod tests {
     use crate::offline::bench::table::Verdict;
 
     fn line(scene: &str, estimator: &str, factor: f64) -> Line {
-        let over = |factor| Over { variant: None, speed_up: SpeedUp { factor, is: Is::Found }, interval: [factor; 2] };
+        let over = |factor| Over { variant: String::new(), speed_up: SpeedUp { factor, is: Is::Found }, interval: [factor; 2] };
         Line {
             scene: scene.into(),
             variant: format!("clusters {estimator}"),

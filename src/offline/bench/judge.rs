@@ -17,8 +17,7 @@ const MARGIN: f64 = 12.0;
 const MOST_DIRECTIONS: u64 = 1 << 16;
 /// An [agreement](ReferenceReport::agreement) above this is no chance: what the cache held is of another renderer.
 const MOST_DISAGREEMENT: f64 = 1.4;
-/// The smallest error over the noise of a truth is to be this, and the sub-samples a pixel after which it is not refined further.
-const ENOUGH: f64 = 10.0;
+/// Sub-samples a pixel after which a truth is not refined further.
 const MOST_SUB_SAMPLES: u64 = 4 * supersample::DEFAULT_SAMPLES as u64;
 /// Estimators whose full rate is a ladder.
 const LADDERS: [&str; 2] = ["mis", "brdf-random"];
@@ -37,10 +36,11 @@ pub fn judge(
 ) -> Result<(ReferenceReport, Converged)> {
     let spread = |frames: &Vec<Frame>| quality::spread(frames).filter(|s| *s > 0.0);
     // Estimates with a control variate would take references that nobody waits for; their errors hold the reference's own.
-    let plain = rows.iter().zip(frames).filter(|(row, _)| !is(row, "estimator", "cv") && !is(row, "estimator", "residual"));
+    let plain =
+        rows.iter().zip(frames).filter(|(row, _)| row.setting("estimator") != "cv" && row.setting("estimator") != "residual");
     let smallest = plain.filter_map(|(_, frames)| spread(frames)).fold(f64::INFINITY, f64::min);
     let goal = Goal { noise: if smallest.is_finite() { smallest / MARGIN } else { 0.0 }, most: MOST_DIRECTIONS };
-    let finest = rows.iter().zip(frames).filter(|(row, _)| is(row, "rate", "full") && is(row, "estimator", "mis"));
+    let finest = rows.iter().zip(frames).filter(|(row, _)| row.setting("rate") == "full" && row.setting("estimator") == "mis");
     let finest = finest.max_by_key(|(row, _)| row.samples.taken).map(|(_, frames)| frames);
     let mut fresh = false;
     loop {
@@ -81,30 +81,23 @@ pub fn judge_by_truth(
     rows: &mut [Row],
     progress: &mut dyn FnMut(u64, u64),
 ) -> Result<(ReferenceReport, Converged)> {
-    let mut truths = Truths::new(world, &base.device, folder, supersample::DEFAULT_SAMPLES / 2);
-    let first: u64 = supersample::DEFAULT_SAMPLES.into();
-    let mut goal = Goal { noise: 0.0, most: first };
-    loop {
-        let image = truths.of(&world.camera, base.config.extent, &goal, progress)?;
-        let (picture, mask) = (image.image().picture, image.whole());
+    let first = supersample::DEFAULT_SAMPLES;
+    let mut truths = Truths::new(world, &base.device, folder, first / 2);
+    let image = truths.of(&world.camera, base.config.extent, &Goal { noise: 0.0, most: first.into() }, progress)?;
+    let mut judge = |truth: &Converged| {
+        let (picture, mask) = (truth.image().picture, truth.whole());
+        let mut smallest = f64::INFINITY;
         for (row, frames) in rows.iter_mut().zip(frames) {
-            row.error = Some(quality::error(frames, &picture, &mask)?);
+            let error = row.error.insert(quality::error(frames, &picture, &mask)?);
+            smallest = smallest.min(error.rmse);
         }
-        let noise = image.noise()?;
-        let smallest = rows.iter().filter_map(|r| r.error.as_ref()).map(|e| e.rmse).fold(f64::INFINITY, f64::min);
-        let margin = smallest / noise.rmse;
-        if margin < ENOUGH && image.directions() < MOST_SUB_SAMPLES {
-            goal = Goal { noise: smallest / ENOUGH, most: MOST_SUB_SAMPLES };
-            continue;
-        }
-        let report = ReferenceReport { directions: image.directions(), cached: image.cached, noise, margin, agreement: None };
-        return Ok((report, image));
-    }
-}
-
-/// Whether a setting has this value.
-fn is(row: &Row, setting: &str, value: &str) -> bool {
-    row.settings.get(setting).is_some_and(|v| v == value)
+        Ok(smallest)
+    };
+    let (image, smallest) = truths.judged(image, &world.camera, MOST_SUB_SAMPLES, &mut judge, progress)?;
+    let noise = image.noise()?;
+    let margin = smallest / noise.rmse;
+    let report = ReferenceReport { directions: image.directions(), cached: image.cached, noise, margin, agreement: None };
+    Ok((report, image))
 }
 
 /// Every variant against full rate with each estimator, but for the rungs of that ladder.
@@ -112,7 +105,7 @@ pub fn compare(rows: &mut [Row]) {
     // Both fall as a power of the directions: the root mean square of radiance, and that of what is displayed.
     let errors = |row: &Row| row.error.as_ref().map(|e| [e.rmse, 10_f64.powf(-e.psnr / 20.0)]);
     let ladder = |estimator: &str, measure: usize| -> Vec<Rung> {
-        let full = rows.iter().filter(|row| is(row, "rate", "full") && is(row, "estimator", estimator));
+        let full = rows.iter().filter(|row| row.setting("rate") == "full" && row.setting("estimator") == estimator);
         let rung = |row: &Row| {
             let directions = row.settings.get("samples")?.as_u64()? as u32;
             Some(Rung { directions, error: errors(row)?[measure], times: row.rounds_ms.clone() })
@@ -122,7 +115,8 @@ pub fn compare(rows: &mut [Row]) {
     let ladders = LADDERS.map(|estimator| (estimator, [0, 1].map(|measure| ladder(estimator, measure))));
     for row in rows {
         let Some([linear, shown]) = errors(row) else { continue };
-        let other = ladders.iter().filter(|(estimator, _)| !(is(row, "rate", "full") && is(row, "estimator", estimator)));
+        let other =
+            ladders.iter().filter(|(estimator, _)| !(row.setting("rate") == "full" && row.setting("estimator") == *estimator));
         let against = |(estimator, [rmse, psnr]): &(&'static str, [Vec<Rung>; 2])| Against {
             estimator,
             rmse: equal(rmse, linear, &row.rounds_ms),

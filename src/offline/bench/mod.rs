@@ -23,6 +23,6 @@ pub mod suites;
 pub mod table;
 pub mod tiles;
 mod together;
-pub(crate) mod truths;
+pub mod truths;
 pub mod variants;
 pub mod xu;

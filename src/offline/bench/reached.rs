@@ -64,7 +64,7 @@ fn line(scene: &SceneReport, directions: u32) -> Option<Reached> {
     let full = scene.row(&format!("full {directions}"))?;
     let error = full.error.as_ref()?;
     // What would suit a scene is known only afterwards.
-    let is = |row: &Row, way: &str| row.part == Part::Compared && row.settings.get("estimator").is_some_and(|e| e == way);
+    let is = |row: &Row, way: &str| row.part == Part::Compared && row.setting("estimator") == way;
     let way = |name: &&str| {
         let reached = scene.variants.iter().filter(|row| is(row, name)).filter_map(|row| {
             let own = row.error.as_ref().filter(|own| own.psnr >= error.psnr && own.relmse <= error.relmse)?;

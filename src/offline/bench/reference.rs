@@ -97,6 +97,11 @@ impl Converged {
         half.frames += 1;
     }
 
+    /// Columns and rows.
+    pub fn extent(&self) -> [u32; 2] {
+        self.extent
+    }
+
     /// Directions a pixel so far.
     pub fn directions(&self) -> u64 {
         u64::from(self.frames()) * u64::from(self.directions)

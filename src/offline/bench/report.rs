@@ -262,6 +262,11 @@ impl Row {
         self.against.iter().find(|a| a.estimator == estimator)?.rmse
     }
 
+    /// One of its settings; empty for numbers and for what there is not.
+    pub fn setting(&self, name: &str) -> &str {
+        self.settings.get(name).and_then(|value| value.as_str()).unwrap_or_default()
+    }
+
     /// Directions a covered sample.
     pub fn directions(&self) -> f64 {
         self.samples.taken as f64 / self.pixels.covered.max(1) as f64
@@ -279,7 +284,7 @@ pub fn gains(scenes: &[SceneReport]) -> Vec<Gain> {
                 let counts = match row.part {
                     Part::Compared => true,
                     Part::Setting => against.estimator == "mis" && measure == "rmse",
-                    Part::FallBack | Part::Control => false,
+                    Part::FallBack | Part::Supersampled | Part::Control => false,
                 };
                 let Some(equal) = equal.filter(|_| counts) else { continue };
                 let entry = (scene.name.as_str(), SpeedUp { factor: equal.speed_up, is: equal.speed_up_is });

@@ -67,6 +67,8 @@ pub enum Part {
     Setting,
     /// What a prediction costs that gives up.
     FallBack,
+    /// What others are compared with in the suite joined.
+    Supersampled,
     /// The first variant once more.
     Control,
 }

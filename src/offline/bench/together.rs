@@ -49,6 +49,6 @@ impl Stage<'_> {
             decisions(DECISIONS.into(), &joined.image),
         ];
         let title = format!("{}: filters, rates and light that is looked up, together", self.world.name);
-        Ok(Figure { name: "together", title, columns: 7, tiles })
+        Ok(Figure { name: "together", title, columns: 6, tiles })
     }
 }

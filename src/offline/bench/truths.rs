@@ -2,6 +2,7 @@
 //! sub-samples each, added until the noise is low enough.
 
 use crate::offline::bench::reference::{Converged, Goal, Hashed, refine};
+use crate::offline::cache;
 use crate::offline::error::Result;
 use crate::offline::headless::{Headless, Options};
 use crate::offline::render::Settings;
@@ -10,12 +11,19 @@ use crate::offline::supersample::{self, Layout};
 use crate::offline::world::{Camera, World};
 use crate::{Config, Requirements};
 use std::fmt::Write as _;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Changes with whatever changes the image of one world.
 const VERSION: &str = "passband truth 1";
+/// The noise of a truth is to be below the smallest error over this.
+const MARGIN: f64 = 10.0;
 /// Seed of truths; measured frames have others.
 const SEED: u32 = 0x7472_7574;
+
+/// The folder of the user's cache in which truths are kept; `None` on systems that have none.
+pub fn cache_folder() -> Option<PathBuf> {
+    cache::folder("truth")
+}
 
 /// Truths of one world from any camera.
 pub(crate) struct Truths<'a> {
@@ -61,6 +69,25 @@ impl<'a> Truths<'a> {
             let half = supersample::half(session, layout, [SEED, image.frames()], &mut |_| ())?;
             Ok(half.into_iter().map(|v| v as f32).collect())
         })
+    }
+
+    /// `image`, refined if its noise is not far enough below the smallest error that `judge` finds by it, to at most `most` sub-samples
+    /// a pixel; and that error. `judge` is called once more with what is refined.
+    pub fn judged(
+        &mut self,
+        image: Converged,
+        camera: &Camera,
+        most: u64,
+        judge: &mut dyn FnMut(&Converged) -> Result<f64>,
+        progress: &mut dyn FnMut(u64, u64),
+    ) -> Result<(Converged, f64)> {
+        let goal = Goal { noise: judge(&image)? / MARGIN, most };
+        let image = match image.noise()?.rmse > goal.noise && image.directions() < most {
+            true => self.of(camera, image.extent(), &goal, progress)?,
+            false => return Ok((image, goal.noise * MARGIN)),
+        };
+        let smallest = judge(&image)?;
+        Ok((image, smallest))
     }
 
     /// The name of the world's content. Its debugging text has every number to the last bit; that of textures takes a second, so

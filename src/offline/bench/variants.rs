@@ -149,7 +149,7 @@ const fn clusters(family: Family, name: &'static str, directions: &'static [u32]
 }
 
 const fn supersampled(name: &'static str, finer: u32, directions: &'static [u32], more: &'static [u32]) -> Family {
-    Family { finer, ..point(FULL, name, directions, more) }
+    Family { part: Part::Supersampled, finer, ..point(FULL, name, directions, more) }
 }
 
 /// Another fit than the default, in the full preset.

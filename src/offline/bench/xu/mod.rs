@@ -12,11 +12,10 @@ mod times;
 mod zoom;
 
 use crate::offline::bench::copy_rate;
-use crate::offline::bench::reference::Goal;
+use crate::offline::bench::reference::{Converged, Goal};
 use crate::offline::bench::report::{Head, Seconds};
 use crate::offline::bench::suites::{Keep, Preset};
 use crate::offline::bench::truths::Truths;
-use crate::offline::cache;
 use crate::offline::error::{Error, Result};
 use crate::offline::headless::{Headless, Options};
 use crate::offline::progress::Progress;
@@ -104,14 +103,6 @@ impl Preset {
         }
     }
 }
-
-/// The folder of the user's cache in which truths are kept; `None` on systems that have none.
-pub fn cache_folder() -> Option<PathBuf> {
-    cache::folder("truth")
-}
-
-/// The error that a truth's noise has to be below is the smallest over this.
-const MARGIN: f64 = 10.0;
 
 /// Runs the suite. `keep` is given a strip of images of each scene and light; without, none are drawn. `found` is given the
 /// report so far after each scene and light, and the whole at the end.
@@ -222,7 +213,7 @@ impl Stage<'_> {
         let clock = Instant::now();
         let first = supersample::DEFAULT_SAMPLES.into();
         let mut truths = Truths::new(&self.world, self.device(), cache, supersample::DEFAULT_SAMPLES / 2);
-        let mut truth = truths.of(&self.world.camera, extent, &Goal { noise: 0.0, most: first }, &mut |done, total| {
+        let truth = truths.of(&self.world.camera, extent, &Goal { noise: 0.0, most: first }, &mut |done, total| {
             told("truth", done, total);
         })?;
         report.seconds.references += clock.elapsed().as_secs_f64();
@@ -248,16 +239,15 @@ impl Stage<'_> {
             rest = more;
         }
         let clock = Instant::now();
-        stills::judge(&mut stills, &truth, &mut rows)?;
-        let smallest = rows.iter().filter_map(|r| r.errors.as_ref()).map(|e| e.rmse).fold(f64::INFINITY, f64::min);
-        let goal = Goal { noise: smallest / MARGIN, most: self.order.preset.most_samples().into() };
-        if truth.noise()?.rmse > goal.noise && truth.directions() < goal.most {
-            truth = truths.of(&self.world.camera, extent, &goal, &mut |done, total| told("truth", done, total))?;
-            stills::judge(&mut stills, &truth, &mut rows)?;
-        }
+        let most = self.order.preset.most_samples().into();
+        let mut judge = |truth: &Converged| {
+            stills::judge(&mut stills, truth, &mut rows)?;
+            Ok(rows.iter().filter_map(|r| r.errors.as_ref()).map(|e| e.rmse).fold(f64::INFINITY, f64::min))
+        };
+        let told_truth = &mut |done, total| told("truth", done, total);
+        let (truth, smallest) = truths.judged(truth, &self.world.camera, most, &mut judge, told_truth)?;
         report.seconds.references += clock.elapsed().as_secs_f64();
         let noise = truth.noise()?;
-        let smallest = rows.iter().filter_map(|r| r.errors.as_ref()).map(|e| e.rmse).fold(f64::INFINITY, f64::min);
         let cost = costs.ok_or_else(|| Error::argument("filters", "at least one", "none"))?;
         if let Some(keep) = keep.as_mut() {
             keep(&self.world.name, strips::strip(self, &truth, &stills, &rows))?;
